@@ -1,0 +1,389 @@
+//! What the page and the worker say to each other, defined once: the TypeScript types of these enums are generated
+//! from here, so that the page cannot drift from the engine.
+//!
+//! Binary things travel beside the message: files as structured-clone `File`s, the canvas as a transferred
+//! `OffscreenCanvas`, exports and pictures as `Uint8Array`.
+
+use serde::{Deserialize, Serialize};
+use tsify::Tsify;
+
+/// From the page to the worker.
+#[derive(Deserialize, Tsify)]
+#[tsify(from_wasm_abi)]
+#[serde(tag = "type", rename_all = "camelCase", rename_all_fields = "camelCase")]
+pub enum Request {
+    /// First message. The canvas itself is passed beside it.
+    Start {
+        /// Size of the canvas in physical pixels.
+        width_px: u32,
+        /// Size of the canvas in physical pixels.
+        height_px: u32,
+        /// Physical pixels per CSS pixel.
+        pixel_ratio: f32,
+        /// Where to compute.
+        device: DeviceChoice,
+    },
+    /// Open a dropped folder: the files are passed beside it, one for each path, in the same order.
+    OpenFolder {
+        /// Paths relative to what was dropped, forward slashes.
+        paths: Vec<String>,
+    },
+    /// Open a dropped zip: the file is passed beside it.
+    OpenZip,
+    /// Open the sample room that is made by rule.
+    OpenSample {
+        /// Which room.
+        seed: u32,
+    },
+    /// Run the plan that the last `Planned` event announced, with these options (a change of options plans again first).
+    Run {
+        /// What to do.
+        options: RunOptions,
+    },
+    /// Plan again with other options, without starting.
+    Replan {
+        /// What to do.
+        options: RunOptions,
+    },
+    /// Hold after the current frame.
+    Pause,
+    /// Go on.
+    Resume,
+    /// Stop; what was fused so far stays, can be looked at and exported.
+    Cancel,
+    /// Make a file of the mesh.
+    Export {
+        /// Echoed in the answer.
+        id: u32,
+        /// Which file.
+        format: MeshFormat,
+        /// Keep the canonical frame (Z up) instead of the scan's own.
+        canonical: bool,
+    },
+    /// A picture of the view as PNG.
+    Screenshot {
+        /// Echoed in the answer.
+        id: u32,
+    },
+    /// Pointer, wheel and keys on the canvas.
+    Input {
+        /// The input.
+        input: InputEvent,
+    },
+    /// How the view is drawn.
+    View {
+        /// All of it, every time.
+        view: ViewOptions,
+    },
+    /// Put the camera somewhere.
+    Look {
+        /// Where.
+        at: LookAt,
+    },
+}
+
+/// Where to compute.
+#[derive(Deserialize, Tsify, Clone, Copy, PartialEq, Eq)]
+#[serde(rename_all = "camelCase")]
+pub enum DeviceChoice {
+    /// WebGPU if it is there, otherwise the CPU.
+    Auto,
+    /// The CPU, even where there is WebGPU.
+    Cpu,
+}
+
+/// What to do with a scan.
+#[derive(Serialize, Deserialize, Tsify, Clone, Copy, PartialEq)]
+#[serde(rename_all = "camelCase")]
+pub struct RunOptions {
+    /// Edge of a voxel in metres; 0.04 by default.
+    pub voxel_size_m: f32,
+    /// Take every n-th keyframe; 1 by default.
+    pub every: u32,
+    /// Depth beyond this is not used, metres.
+    pub max_depth_m: f32,
+}
+
+/// A file of the mesh.
+#[derive(Deserialize, Tsify, Clone, Copy)]
+#[serde(rename_all = "camelCase")]
+pub enum MeshFormat {
+    /// glTF 2.0 binary.
+    Glb,
+    /// Stanford PLY, binary.
+    Ply,
+    /// Wavefront OBJ.
+    Obj,
+}
+
+/// Pointer, wheel and keys, in physical pixels of the canvas.
+#[derive(Deserialize, Tsify)]
+#[serde(tag = "kind", rename_all = "camelCase", rename_all_fields = "camelCase")]
+pub enum InputEvent {
+    /// A button or finger goes down.
+    PointerDown {
+        /// Pointer id of the browser.
+        id: i32,
+        /// From the left edge.
+        x: f32,
+        /// From the top edge.
+        y: f32,
+        /// 0 left, 1 middle, 2 right, as in `PointerEvent.button`.
+        button: u8,
+        /// A finger rather than a mouse or pen.
+        touch: bool,
+        /// Shift was held (a drag then pans).
+        shift: bool,
+    },
+    /// It moves.
+    PointerMove {
+        /// Pointer id of the browser.
+        id: i32,
+        /// From the left edge.
+        x: f32,
+        /// From the top edge.
+        y: f32,
+    },
+    /// It goes up or is cancelled.
+    PointerUp {
+        /// Pointer id of the browser.
+        id: i32,
+    },
+    /// The wheel, in CSS pixels as normalised by the page.
+    Wheel {
+        /// Positive: away from the scene.
+        delta: f32,
+        /// From the left edge.
+        x: f32,
+        /// From the top edge.
+        y: f32,
+    },
+    /// Focus the point under the cursor.
+    DoubleClick {
+        /// From the left edge.
+        x: f32,
+        /// From the top edge.
+        y: f32,
+    },
+    /// A key by `KeyboardEvent.code`.
+    Key {
+        /// For example `KeyW`, `ArrowLeft`.
+        code: String,
+        /// Down or up.
+        down: bool,
+    },
+    /// The canvas has another size.
+    Resize {
+        /// Physical pixels.
+        width_px: u32,
+        /// Physical pixels.
+        height_px: u32,
+        /// Physical pixels per CSS pixel.
+        pixel_ratio: f32,
+    },
+    /// The canvas lost the focus: let go of everything.
+    Blur,
+}
+
+/// How the view is drawn.
+#[derive(Deserialize, Tsify, Clone, Copy)]
+#[serde(rename_all = "camelCase")]
+pub struct ViewOptions {
+    /// Colour, normal, wireframe or depth.
+    pub shading: ShadingMode,
+    /// The cameras and their path.
+    pub cameras: bool,
+    /// Light or dark.
+    pub dark: bool,
+    /// Draw walls seen from behind.
+    pub back_faces: bool,
+    /// The visitor asked for little motion.
+    pub reduced_motion: bool,
+}
+
+/// What a surface is painted with.
+#[derive(Deserialize, Tsify, Clone, Copy)]
+#[serde(rename_all = "camelCase")]
+pub enum ShadingMode {
+    /// The colour of the photos.
+    Color,
+    /// The direction that the surface faces.
+    Normal,
+    /// The triangles.
+    Wireframe,
+    /// The distance from the eye.
+    Depth,
+}
+
+/// Where to put the camera.
+#[derive(Deserialize, Tsify, Clone, Copy)]
+#[serde(tag = "kind", rename_all = "camelCase")]
+pub enum LookAt {
+    /// Everything in view.
+    Home,
+    /// From above.
+    Top,
+    /// Through the camera of a keyframe.
+    Keyframe {
+        /// Its position in the plan.
+        index: u32,
+    },
+}
+
+/// From the worker to the page.
+#[derive(Serialize, Tsify)]
+#[tsify(into_wasm_abi)]
+#[serde(tag = "type", rename_all = "camelCase", rename_all_fields = "camelCase")]
+pub enum Event {
+    /// The engine is up.
+    Ready {
+        /// `webgpu` or `cpu`.
+        device: String,
+        /// Name of the adapter, for reports.
+        adapter: String,
+        /// Why it is the CPU, when it is.
+        note: Option<String>,
+    },
+    /// A scan was opened.
+    Opened {
+        /// Name of the folder, zip or sample.
+        name: String,
+        /// For example `7-Scenes`.
+        format: String,
+        /// Usable frames.
+        frames: u32,
+        /// Whether depth was recorded.
+        has_depth: bool,
+        /// How up was found, in words.
+        gravity: String,
+    },
+    /// What will be done, before any work.
+    Planned {
+        /// The plan.
+        plan: PlanSummary,
+    },
+    /// A stage began.
+    Stage {
+        /// `opening`, `warmingUp`, `fusing`, `meshing`.
+        stage: StageName,
+    },
+    /// A count of known work within the stage.
+    Progress {
+        /// Done so far.
+        done: u32,
+        /// Of this many.
+        total: u32,
+        /// Triangles on show.
+        triangles: u32,
+        /// Seconds since the run began, pauses left out.
+        elapsed_s: f64,
+    },
+    /// Bricks of the mesh changed on show.
+    Bricks {
+        /// How many bricks now have a surface.
+        bricks: u32,
+        /// Triangles on show.
+        triangles: u32,
+    },
+    /// The run is held.
+    Paused,
+    /// The run goes on.
+    Resumed,
+    /// The run came to its end, or was cancelled.
+    Finished {
+        /// It was cancelled: the mesh is of the frames so far.
+        cancelled: bool,
+        /// Frames fused.
+        frames: u32,
+        /// Bricks of the volume.
+        bricks: u32,
+        /// Triangles on show.
+        triangles: u32,
+        /// Seconds, pauses left out.
+        elapsed_s: f64,
+        /// Size of the engine's memory in bytes.
+        heap_bytes: f64,
+    },
+    /// Something about the scan that the user should know; work goes on.
+    Finding {
+        /// What.
+        finding: FindingMessage,
+    },
+    /// Work cannot go on.
+    Failed {
+        /// One of a few words for programs: `noWebgpu`, `scan`, `memory`, `device`, `internal`, `export`.
+        code: String,
+        /// One plain sentence.
+        message: String,
+        /// What to try.
+        advice: String,
+    },
+    /// The file that was asked for; its bytes are passed beside it.
+    Exported {
+        /// From the request.
+        id: u32,
+        /// Suggested name.
+        file_name: String,
+        /// Its MIME type.
+        mime: String,
+    },
+    /// Where the eye is, when it has come to rest.
+    CameraChanged {
+        /// In words, for those who cannot see the canvas.
+        description: String,
+    },
+}
+
+/// A plan, in numbers for the page.
+#[derive(Serialize, Tsify, Clone)]
+#[serde(rename_all = "camelCase")]
+pub struct PlanSummary {
+    /// The options planned with.
+    pub options: RunOptions,
+    /// Usable frames of the scan.
+    pub frames: u32,
+    /// Frames kept by the keyframe rule.
+    pub keyframes: u32,
+    /// Bricks expected.
+    pub bricks: u32,
+    /// Bytes on the device expected.
+    pub device_bytes: f64,
+    /// Bytes of heap expected.
+    pub heap_bytes: f64,
+    /// What was turned down and why, in words; empty when everything fits.
+    pub remarks: Vec<String>,
+}
+
+/// A stage of the run.
+#[derive(Serialize, Tsify, Clone, Copy, PartialEq, Eq)]
+#[serde(rename_all = "camelCase")]
+pub enum StageName {
+    /// The scan is read.
+    Opening,
+    /// Kernels are compiled.
+    WarmingUp,
+    /// Depth becomes a volume.
+    Fusing,
+    /// The last bricks of the mesh are made.
+    Meshing,
+}
+
+/// Something about the scan that the user should know.
+#[derive(Serialize, Tsify, Clone)]
+#[serde(rename_all = "camelCase")]
+pub struct FindingMessage {
+    /// `error`, `warning` or `info`.
+    pub severity: String,
+    /// For programs.
+    pub code: String,
+    /// The file it is about.
+    pub file: Option<String>,
+    /// The line in it, from 1.
+    pub line: Option<u32>,
+    /// What was expected.
+    pub expected: String,
+    /// What was found.
+    pub found: String,
+    /// What to do.
+    pub advice: String,
+}
