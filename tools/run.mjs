@@ -1,11 +1,12 @@
 // Starting other programs, in one place: where the repository is, how output is kept, how a time limit ends a whole process group.
 import { spawn } from 'node:child_process';
-import { mkdirSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdirSync, writeFileSync } from 'node:fs';
 import { delimiter, dirname, join } from 'node:path';
-import { existsSync } from 'node:fs';
-import { fileURLToPath } from 'node:url';
+import { fileURLToPath, pathToFileURL } from 'node:url';
 
 export const root = dirname(dirname(fileURLToPath(import.meta.url)));
+/** Whether the module of this `import.meta.url` is the program that was started. */
+export const isMain = (url) => Boolean(process.argv[1]) && pathToFileURL(process.argv[1]).href === url;
 /** Everything the set-up installs outside the system lies here; git ignores it. */
 export const toolsDir = join(root, '.tools');
 
@@ -17,6 +18,22 @@ export class Failed extends Error {
   constructor(what, result) {
     super(`${what} ${result.timedOut ? `took longer than ${result.limitSeconds} s` : `ended with code ${result.code}`}`);
     this.output = result.output;
+  }
+}
+
+/** The process groups that are running; they end with this process. */
+const groups = new Set();
+function stop() {
+  for (const group of groups) killGroup(group);
+  process.exit(130);
+}
+process.on('SIGINT', stop).on('SIGTERM', stop);
+
+function killGroup(pid) {
+  try {
+    process.kill(-pid, 'SIGKILL');
+  } catch {
+    // It has ended meanwhile.
   }
 }
 
@@ -40,11 +57,12 @@ export function run(program, args, { cwd = root, env = process.env, limitSeconds
   return new Promise((resolve) => {
     const own = limitSeconds > 0 && process.platform !== 'win32';
     const child = spawn(program, args, { cwd, env, detached: own, stdio: ['pipe', 'pipe', 'pipe'], shell: process.platform === 'win32' && /\.cmd$/.test(program) });
+    if (own && child.pid) groups.add(child.pid);
     let output = '';
     let timedOut = false;
-    const timer = limitSeconds > 0 && setTimeout(() => {
+    const timer = limitSeconds <= 0 ? undefined : setTimeout(() => {
       timedOut = true;
-      if (own) process.kill(-child.pid, 'SIGKILL');
+      if (own) killGroup(child.pid);
       else child.kill('SIGKILL');
     }, limitSeconds * 1000);
     const keep = (stream) => (chunk) => {
@@ -56,6 +74,7 @@ export function run(program, args, { cwd = root, env = process.env, limitSeconds
     child.stdin.on('error', () => {}).end(input);
     const end = (code) => {
       clearTimeout(timer);
+      groups.delete(child.pid);
       resolve({ code, output, timedOut, limitSeconds });
     };
     child.on('error', (error) => {

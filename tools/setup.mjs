@@ -1,6 +1,6 @@
 // Prepares the machine: `node tools/setup.mjs start` for building and serving the page, `node tools/setup.mjs test` for every test as well.
 // Each step looks first, does only what is missing, and says so in a line; what only the user can do is said in a line with the command.
-import { Missing, seconds } from './run.mjs';
+import { Missing, isMain, seconds } from './run.mjs';
 import { cargoTools } from './setup/cargo.mjs';
 import { npmPackages } from './setup/npm.mjs';
 import { wasmTarget } from './setup/wasm.mjs';
@@ -54,7 +54,7 @@ export async function setup(purpose) {
   return good;
 }
 
-if (import.meta.main ?? process.argv[1]?.endsWith('setup.mjs')) {
+if (isMain(import.meta.url)) {
   const purpose = process.argv[2] ?? 'start';
   if (!(purpose in plans)) {
     console.error(`usage: node tools/setup.mjs ${Object.keys(plans).join('|')}`);

@@ -4,9 +4,9 @@ import { create, globals } from 'webgpu';
 Object.assign(globalThis, globals);
 Object.defineProperty(globalThis, 'navigator', { value: { gpu: create([]) }, configurable: true });
 // wgpu asks whether the global is a window or a worker before it looks for navigator.gpu.
-globalThis.Window = class Window {
+class Window {
   static [Symbol.hasInstance](value) {
     return value === globalThis;
   }
-};
-globalThis.window = globalThis;
+}
+Object.assign(globalThis, { Window, window: globalThis });

@@ -4,11 +4,12 @@ import { Missing, must, run, which } from '../run.mjs';
 
 const env = { ...process.env, DEBIAN_FRONTEND: 'noninteractive' };
 const keyring = '/usr/share/keyrings/debian-archive-keyring.gpg';
+/** @type {Promise<unknown> | null} */
 let updated = null;
 let queue = Promise.resolve();
 
 export const hasApt = () => process.platform === 'linux' && which('apt-get') !== null;
-export const mayInstall = () => hasApt() && process.getuid() === 0;
+export const mayInstall = () => hasApt() && process.getuid?.() === 0;
 
 /** The release's name in Debian's and Ubuntu's words, such as `bookworm`, and the distribution's, such as `debian`. */
 export function release() {

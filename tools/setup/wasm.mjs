@@ -27,11 +27,8 @@ async function links(toolchain) {
   const folder = mkdtempSync(join(tmpdir(), 'wasm-probe-'));
   try {
     const common = ['--edition', '2024', '--target', target, '-'];
-    for (const [source, args] of [[library, ['--crate-type', 'cdylib', '-o', join(folder, 'lib.wasm')]], [test, ['--test', '-o', join(folder, 'test.wasm')]]]) {
-      const result = await run('rustc', [...args, ...common], { env: toolchainEnv(toolchain), input: source, cwd: folder });
-      if (result.code !== 0) return false;
-    }
-    return true;
+    const compile = async (source, ...kind) => (await run('rustc', [...kind, ...common], { env: toolchainEnv(toolchain), input: source, cwd: folder })).code === 0;
+    return (await compile(library, '--crate-type', 'cdylib', '-o', 'lib.wasm')) && (await compile(test, '--test', '-o', 'test.wasm'));
   } finally {
     rmSync(folder, { recursive: true, force: true });
   }

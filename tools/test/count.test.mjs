@@ -1,0 +1,46 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { count, reasons, sum } from './count.mjs';
+
+const of = (passed, failed, skipped) => ({ passed, failed, skipped });
+
+test('cargo: several binaries add up, a test that says it was skipped is no pass', () => {
+  const output = `running 2 tests
+test a ... ok
+successes:
+
+---- real_scan stdout ----
+skipped: the scan is not here
+
+---- other stdout ----
+a line that only mentions skipped: things
+
+test result: ok. 2 passed; 0 failed; 1 ignored; 0 measured; 0 filtered out; finished in 0.00s
+test result: FAILED. 3 passed; 1 failed; 0 ignored; 0 measured; 0 filtered out; finished in 0.00s
+`;
+  assert.deepEqual(count('cargo', { output, code: 101 }), of(4, 1, 2));
+  assert.deepEqual(reasons(output), ['skipped: the scan is not here']);
+});
+
+test('cargo: a program that ends with an error without a failed test has failed', () => {
+  assert.deepEqual(count('cargo', { output: 'error: could not compile', code: 101 }), of(0, 1, 0));
+});
+
+test('no test at all is a failure', () => {
+  assert.deepEqual(count('cargo', { output: 'test result: ok. 0 passed; 0 failed; 0 ignored', code: 0 }), of(0, 1, 0));
+});
+
+test('node: both reporters, coloured or not', () => {
+  assert.deepEqual(count('node', { output: '# pass 3\n# fail 0\n# cancelled 0\n# skipped 1\n# todo 0\n', code: 0 }), of(3, 0, 1));
+  assert.deepEqual(count('node', { output: '\x1b[34mℹ pass 3\x1b[39m\nℹ fail 2\nℹ cancelled 1\nℹ skipped 0\n', code: 1 }), of(3, 3, 0));
+});
+
+test('python: failures, errors and skips are taken from the runs', () => {
+  assert.deepEqual(count('python', { output: 'Ran 9 tests in 0.1s\n\nFAILED (failures=1, errors=2, skipped=3)\n', code: 1 }), of(3, 3, 3));
+  assert.deepEqual(count('python', { output: 'Ran 4 tests in 0.1s\n\nOK (skipped=1)\n', code: 0 }), of(3, 0, 1));
+  assert.deepEqual(count('python', { output: 'Ran 4 tests in 0.1s\n\nOK\n', code: 0 }), of(4, 0, 0));
+});
+
+test('sums', () => {
+  assert.deepEqual(sum([of(1, 0, 0), of(2, 3, 4)]), of(3, 3, 4));
+});
