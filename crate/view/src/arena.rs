@@ -23,10 +23,6 @@ const BLOCK_BYTES: u64 = BLOCK_VERTICES as u64 * VERTEX_STRIDE_BYTES;
 /// between, which are bricks out of sight or zeros.
 const BRIDGE_BLOCKS: u32 = 32;
 
-/// How far a brick's triangles may reach out of its box, as a share of its edge: marching cubes
-/// closes the gap to the next brick within one voxel.
-const OVERHANG: f32 = 0.15;
-
 /// What the arena turns down.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ArenaError {
@@ -176,9 +172,7 @@ impl Arena {
     pub(crate) fn draws(&self, clip_from_world: &Mat4) -> Vec<(&wgpu::Buffer, Vec<Range<u32>>)> {
         let mut visible: Vec<Vec<Range<u32>>> = vec![Vec::new(); self.pages.len()];
         for (&brick, slot) in &self.slots {
-            let mut reach = bounds::of_brick(brick, self.brick_size_m);
-            reach.min -= OVERHANG * self.brick_size_m;
-            reach.max += OVERHANG * self.brick_size_m;
+            let reach = bounds::reach_of_brick(brick, self.brick_size_m);
             if bounds::may_be_seen(&reach, clip_from_world) {
                 visible[slot.page].push(slot.blocks.clone());
             }

@@ -12,6 +12,19 @@ pub fn of_brick(brick: [i32; 3], brick_size_m: f32) -> Bounds {
     }
 }
 
+/// How far a brick's triangles may reach out of its box, as a share of its edge: marching cubes closes the gap to the
+/// next brick within one voxel.
+const OVERHANG: f32 = 0.15;
+
+/// The box that holds all triangles of lattice brick `brick`.
+pub fn reach_of_brick(brick: [i32; 3], brick_size_m: f32) -> Bounds {
+    let exact = of_brick(brick, brick_size_m);
+    Bounds {
+        min: exact.min - OVERHANG * brick_size_m,
+        max: exact.max + OVERHANG * brick_size_m,
+    }
+}
+
 /// The box around all `bricks`; `None` of none.
 pub fn of_bricks<'a>(
     bricks: impl IntoIterator<Item = &'a [i32; 3]>,

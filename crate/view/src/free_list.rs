@@ -85,7 +85,7 @@ mod tests {
         for _ in 0..20_000 {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             let roll = seed >> 16;
-            if roll % 3 == 0 && !held.is_empty() {
+            if roll.is_multiple_of(3) && !held.is_empty() {
                 let range = held.swap_remove(roll as usize % held.len());
                 range.clone().for_each(|i| owner[i as usize] = false);
                 list.give_back(range);

@@ -4,5 +4,6 @@
 #![allow(clippy::unwrap_used)] // A failed step is a failed test.
 
 mod arena;
+mod cpu;
 mod shading;
 mod support;
