@@ -17,16 +17,20 @@ const TOLERANCE_DEG: f64 = 8.0;
 /// A level patch is rarer by chance than an upright one, which many a slanted direction also has.
 const UPRIGHT_WEIGHT: f64 = 0.5;
 /// How much level cameras count against surfaces.
-const CAMERA_WEIGHT: f64 = 0.3;
+const CAMERA_WEIGHT: f64 = 1.0;
 /// Roll of a hand-held camera (standard deviation of its x axis out of level).
-const CAMERA_ROLL_RAD: f64 = 0.15;
+const CAMERA_ROLL_RAD: f64 = 0.2;
 const GUESS_WEIGHT: f64 = 0.1;
 /// About a quarter of a square metre of level surface.
 const MIN_LEVEL_PATCHES: usize = 40;
+/// About one and a half square metres of wall.
+const MIN_WALL_PATCHES: f64 = 250.0;
 /// Height noise of a patch on a perfect floor.
 const NOISE_M: f64 = 0.005;
+/// Lean of a patch on a perfect wall; generous, because all patches of a wall share the errors of their poses.
+const NORMAL_NOISE_RAD: f64 = 0.03;
 
-/// Refines the cameras' `guess`; `right` are the cameras' x axes. `None` when too little level surface is seen.
+/// Refines the cameras' `guess`; `right` are the cameras' x axes. `None` when neither enough level surface nor walls facing two ways are seen.
 pub(super) fn refine(guess: DVec3, right: &[DVec3], patches: &[Patch]) -> Option<DVec3> {
     let sample = |list: usize, wanted: usize| list.div_ceil(wanted).max(1);
     let few: Vec<DVec3> = patches
@@ -106,7 +110,8 @@ fn by_normals(mut up: DVec3, patches: &[Patch]) -> DVec3 {
 }
 
 /// The common normal of the level planes: the direction along which their points scatter least about each plane's
-/// own height. Points over metres say more than their noisy normals.
+/// own height. Points over metres say more than their noisy normals. Walls help where little floor is seen. Both
+/// count by their variance, as in weighted least squares.
 fn by_planes(mut up: DVec3, patches: &[Patch]) -> Option<DVec3> {
     let mut found = false;
     for band_m in [0.08, 0.06, 0.05, 0.04, 0.03, 0.03] {
@@ -135,15 +140,51 @@ fn by_planes(mut up: DVec3, patches: &[Patch]) -> Option<DVec3> {
             weight_sum += members_count / variance_m2;
             count += members.len();
         }
-        if count < MIN_LEVEL_PATCHES {
+        let walls = Walls::of(patches, up);
+        if count < MIN_LEVEL_PATCHES && !walls.fix_up(up) {
             break;
         }
         found = true;
+        spread += walls.spread * walls.variance.recip();
         // A strip a hand wide says nothing about its roll: there the direction so far is kept.
         let keep = (DMat3::IDENTITY - outer(up)) * (0.05 * 0.05 * weight_sum);
         up = towards(eigen::smallest(spread + keep), up);
     }
     found.then_some(up)
+}
+
+/// The normals of upright patches.
+struct Walls {
+    spread: DMat3,
+    count: f64,
+    /// Of their lean, in square radians.
+    variance: f64,
+}
+
+impl Walls {
+    fn of(patches: &[Patch], up: DVec3) -> Walls {
+        let sin_limit = 6.0_f64.to_radians().sin();
+        let normals = || {
+            patches
+                .iter()
+                .map(|patch| patch.normal)
+                .filter(|normal| normal.dot(up).abs() < sin_limit)
+        };
+        let spread = normals().fold(DMat3::ZERO, |sum, normal| sum + outer(normal));
+        let count = normals().count() as f64;
+        let lean = up.dot(spread * up) / count.max(1.0);
+        Walls {
+            spread,
+            count,
+            variance: lean + NORMAL_NOISE_RAD * NORMAL_NOISE_RAD,
+        }
+    }
+
+    /// Walls that face two ways leave one direction for up, even where no level surface is seen.
+    fn fix_up(&self, up: DVec3) -> bool {
+        let rarest = eigen::smallest(self.spread + outer(up) * self.count);
+        self.count >= MIN_WALL_PATCHES && rarest.dot(self.spread * rarest) > 0.05 * self.count
+    }
 }
 
 /// Heights along `up` at which many points lie: peaks of a histogram, each refined to the mean around it.

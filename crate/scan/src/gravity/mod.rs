@@ -97,11 +97,11 @@ pub(crate) fn estimate(
             let found = if with_depth.is_empty() {
                 "no depth"
             } else {
-                "no floor, ceiling or table in a sample of the depth pictures"
+                "neither a level surface nor walls facing two ways in a sample of the depth pictures"
             };
             log.add(
                 Finding::new(Severity::Warning, "gravity-from-cameras")
-                    .expected("level surfaces to find the up direction, which this format does not give")
+                    .expected("a floor, tables or walls to find the up direction, which this format does not give")
                     .found(found)
                     .advice("Up is taken from how the cameras were held and may be tilted by some degrees")
                     .frames(frames.len()),

@@ -23,7 +23,7 @@ const SAMPLES: u32 = 8;
 /// Depth beyond which sensors are too noisy, and before which they see the user's hand.
 const RANGE_M: std::ops::Range<f64> = 0.3..6.0;
 /// Largest root mean square distance from the fitted plane, relative to the depth.
-const FLATNESS: f64 = 0.01;
+const FLATNESS: f64 = 0.03;
 /// One patch is kept in each cube of this size, so that a surface counts by its area, not by how often it was seen.
 const CUBE_M: f64 = 0.08;
 
@@ -32,7 +32,7 @@ pub(super) fn of_frames<'f>(frames: impl Iterator<Item = (&'f Frame, DepthImage)
     let mut taken: HashSet<[i32; 3]> = HashSet::new();
     let mut patches = Vec::new();
     for (frame, depth) in frames {
-        let cell = (depth.width / CELLS_ACROSS).max(SAMPLES / 2);
+        let cell = (depth.width / CELLS_ACROSS).max(SAMPLES);
         for top in (0..depth.height.saturating_sub(cell)).step_by(cell as usize) {
             for left in (0..depth.width.saturating_sub(cell)).step_by(cell as usize) {
                 let Some(patch) = fit(frame, &depth, left, top, cell) else {
