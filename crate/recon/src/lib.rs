@@ -1,1 +1,12 @@
-//! (being written)
+//! The job: from a scan to a mesh. What fits ([`plan`]), in what order ([`run`]), what is told on the way ([`Sink`]),
+//! and how good the result is ([`evaluate`]). The same code behind the worker and the command line.
+
+mod convert;
+pub mod evaluate;
+mod event;
+mod plan;
+mod run;
+
+pub use event::{Flow, Sink, Stage};
+pub use plan::{Limits, Options, Plan, PlanError, plan};
+pub use run::{Outcome, RunError, run};

@@ -54,6 +54,12 @@ impl VolumeConfig {
         self.binding_bytes / (BRICK_VOXELS * channels * size_of::<f32>()) - 1
     }
 
+    /// The bricks that a depth image would be written to, in x, y, z order.
+    pub fn bricks_of(&self, view: &DepthView<'_>) -> Vec<Brick> {
+        let brick_size_m = self.voxel_size_m * BRICK_EDGE as f32;
+        bricks_near_surface(view, brick_size_m, self.truncation_m, self.max_depth_m)
+    }
+
     /// An empty volume on `device`.
     ///
     /// # Errors
@@ -134,7 +140,7 @@ impl Volume {
             max_depth_m,
             ..
         } = self.config;
-        let bricks = bricks_near_surface(view, self.brick_size_m(), truncation_m, max_depth_m);
+        let bricks = self.config.bricks_of(view);
         self.reserve(&bricks)?;
         let lengths = Lengths {
             voxel_size_m,

@@ -1,0 +1,31 @@
+//! From the scan's types to the volume's and the mesh's: neither room knows the other.
+
+use glam::Affine3A;
+use mesh::camera::Pinhole;
+use scan::{Camera, ColorImage, DepthImage, Frame};
+use volume::DepthView;
+
+/// A frame's pictures as the volume takes them, colour where there is any.
+pub(crate) fn depth_view<'a>(
+    frame: &Frame,
+    depth: &'a DepthImage,
+    color: Option<&'a ColorImage>,
+) -> DepthView<'a> {
+    DepthView {
+        depth_m: &depth.depth_m,
+        depth_camera: pinhole(&frame.depth_camera),
+        color: color.map(|image| (image.rgb.as_slice(), pinhole(&frame.color_camera))),
+        world_from_camera: Affine3A::from_mat4(glam::DMat4::from(frame.pose).as_mat4()),
+    }
+}
+
+pub(crate) fn pinhole(camera: &Camera) -> Pinhole {
+    Pinhole {
+        width: camera.width,
+        height: camera.height,
+        fx: camera.fx as f32,
+        fy: camera.fy as f32,
+        cx: camera.cx as f32,
+        cy: camera.cy as f32,
+    }
+}

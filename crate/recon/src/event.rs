@@ -1,0 +1,55 @@
+//! What a run tells while it goes on, and how it is told to wait or to stop.
+
+use glam::Vec3;
+use scan::Finding;
+use volume::{BrickMeshes, VolumeError};
+
+/// The stages of a run, in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Kernels are compiled.
+    WarmingUp,
+    /// Depth becomes a volume; counted in keyframes.
+    Fusing,
+    /// The last bricks of the mesh are made; counted in bricks.
+    Meshing,
+}
+
+/// Whether to go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flow {
+    /// Go on.
+    Continue,
+    /// Stop here; what was done so far stays.
+    Stop,
+}
+
+/// Whoever watches a run. Every method but [`Sink::checkpoint`] has a body that ignores the news.
+pub trait Sink {
+    /// A stage began; it has `total` steps.
+    fn stage(&mut self, _stage: Stage, _total: usize) {}
+
+    /// `done` of the stage's steps are behind us.
+    fn progress(&mut self, _done: usize) {}
+
+    /// Something about a frame that the user should know; the run goes on without it.
+    fn finding(&mut self, _finding: Finding) {}
+
+    /// Where bricks are wanted first, in the canonical world; `None` for no streaming: the mesh is then taken at the end.
+    fn eye(&self) -> Option<Vec3> {
+        None
+    }
+
+    /// The surface of some bricks changed: the soup lies on the run's device.
+    ///
+    /// # Errors
+    /// A device that failed to hand it over.
+    #[allow(async_fn_in_trait)]
+    async fn bricks(&mut self, _meshes: BrickMeshes) -> Result<(), VolumeError> {
+        Ok(())
+    }
+
+    /// Called between any two steps: the place to draw a frame, to wait while paused, or to stop.
+    #[allow(async_fn_in_trait)]
+    async fn checkpoint(&mut self) -> Flow;
+}
