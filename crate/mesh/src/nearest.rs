@@ -3,24 +3,19 @@
 //! A k-d tree of our own: the well-kept crates bring rayon, coroutines and CPU detection with them, which do not fit a
 //! small wasm, while this needs one page.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
-/// Points below this number are compared one by one.
-const LEAF: usize = 12;
+/// Points up to this number are compared one by one.
+const LEAF: usize = 8;
 
 /// A fixed set of points that answers "how far is the nearest one".
 ///
-/// A balanced k-d tree without pointers: the points are sorted so that each node is a range, halved at its middle along
-/// its longest side. Node i has the children 2 i + 1 and 2 i + 2.
+/// A balanced k-d tree without pointers: the points are sorted so that each node is a range of them, halved at its
+/// middle along its longest side. Node i has the children 2 i + 1 and 2 i + 2. Each node keeps the tight box around its
+/// points, so that also a query far away from a thin surface discards most of it.
 pub struct PointIndex {
-    points: Vec<Vec3>,
-    splits: Vec<Split>,
-}
-
-#[derive(Clone, Copy, Default)]
-struct Split {
-    axis: usize,
-    at: f32,
+    points: Vec<Vec3A>,
+    boxes: Vec<[Vec3A; 2]>,
 }
 
 impl PointIndex {
@@ -31,17 +26,17 @@ impl PointIndex {
             levels += 1;
         }
         let mut index = Self {
-            points: points.to_vec(),
-            splits: vec![Split::default(); (1 << levels) - 1],
+            points: points.iter().map(|&point| point.into()).collect(),
+            boxes: vec![[Vec3A::ZERO; 2]; (2 << levels) - 1],
         };
-        split(&mut index.points, &mut index.splits, 0);
+        arrange(&mut index.points, &mut index.boxes, 0);
         index
     }
 
     /// Distance in metres from `query` to the nearest point; infinite when there are no points.
     pub fn distance(&self, query: Vec3) -> f32 {
         let mut best = f32::INFINITY;
-        self.search(query, 0, 0, self.points.len(), Vec3::ZERO, 0.0, &mut best);
+        self.search(query.into(), 0, &self.points, &mut best);
         best.sqrt()
     }
 
@@ -67,63 +62,49 @@ impl PointIndex {
         }
     }
 
-    /// Lowers `best` (squared) to what the node's range holds. `offset` is how far the query lies outside the node's
-    /// box along each axis, `gap` its squared length (Arya and Mount 1993).
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "the state of one step down the tree"
-    )]
-    fn search(
-        &self,
-        query: Vec3,
-        node: usize,
-        start: usize,
-        end: usize,
-        offset: Vec3,
-        gap: f32,
-        best: &mut f32,
-    ) {
-        let Some(&Split { axis, at }) = self.splits.get(node) else {
-            for &point in &self.points[start..end] {
+    /// Lowers `best`, a squared distance, to the nearest of `points`, which are those of `node`.
+    fn search(&self, query: Vec3A, node: usize, points: &[Vec3A], best: &mut f32) {
+        let (low, high) = (2 * node + 1, 2 * node + 2);
+        if high >= self.boxes.len() {
+            for &point in points {
                 *best = best.min(point.distance_squared(query));
             }
             return;
-        };
-        let middle = start.midpoint(end);
-        let beyond = query[axis] - at;
-        let low = (2 * node + 1, start, middle);
-        let high = (2 * node + 2, middle, end);
-        let (near, far) = if beyond < 0.0 {
-            (low, high)
-        } else {
-            (high, low)
-        };
-        self.search(query, near.0, near.1, near.2, offset, gap, best);
-        let mut far_offset = offset;
-        far_offset[axis] = beyond;
-        let far_gap = gap - offset[axis] * offset[axis] + beyond * beyond;
-        if far_gap < *best {
-            self.search(query, far.0, far.1, far.2, far_offset, far_gap, best);
         }
+        let (low_points, high_points) = points.split_at(points.len() / 2);
+        let mut near = (self.gap(query, low), low, low_points);
+        let mut far = (self.gap(query, high), high, high_points);
+        if far.0 < near.0 {
+            (near, far) = (far, near);
+        }
+        for (gap, node, points) in [near, far] {
+            if gap < *best {
+                self.search(query, node, points, best);
+            }
+        }
+    }
+
+    /// Squared distance from `query` to the box of `node`.
+    fn gap(&self, query: Vec3A, node: usize) -> f32 {
+        let [min, max] = self.boxes[node];
+        query.distance_squared(query.clamp(min, max))
     }
 }
 
-/// Orders `points` for the subtree at `node`.
-fn split(points: &mut [Vec3], splits: &mut [Split], node: usize) {
-    if node >= splits.len() {
+/// Orders the points of `node` and of all below it, and fills in their boxes.
+fn arrange(points: &mut [Vec3A], boxes: &mut [[Vec3A; 2]], node: usize) {
+    if node >= boxes.len() || points.is_empty() {
         return;
     }
-    let Some(bounds) = crate::Bounds::of(points) else {
-        return;
-    };
-    let axis = bounds.size().max_position();
+    let min = points.iter().copied().fold(points[0], Vec3A::min);
+    let max = points.iter().copied().fold(points[0], Vec3A::max);
+    boxes[node] = [min, max];
+    let axis = (max - min).max_position();
     let middle = points.len() / 2;
-    points.select_nth_unstable_by(middle, |a, b| a[axis].total_cmp(&b[axis]));
-    splits[node] = Split {
-        axis,
-        at: points[middle][axis],
-    };
+    if 2 * node + 1 < boxes.len() {
+        points.select_nth_unstable_by(middle, |a, b| a[axis].total_cmp(&b[axis]));
+    }
     let (low, high) = points.split_at_mut(middle);
-    split(low, splits, 2 * node + 1);
-    split(high, splits, 2 * node + 2);
+    arrange(low, boxes, 2 * node + 1);
+    arrange(high, boxes, 2 * node + 2);
 }

@@ -1,5 +1,7 @@
 //! GLB and OBJ as a viewer sees them. The Khronos validator and trimesh look at the same files in the project's tests.
 
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+
 use glam::{Quat, Vec3};
 use mesh::{Mesh, glb, obj};
 use serde_json::Value;

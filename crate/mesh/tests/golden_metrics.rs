@@ -1,5 +1,7 @@
 //! Sampling, rendering, metrics and protocols against numbers from NumPy and SciPy (tests/reference/metrics.py).
 
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+
 use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 use mesh::camera::Pinhole;
 use mesh::metrics::{Depth2d, Surface3d, compare_points, depth, depth_2d, robustness};
