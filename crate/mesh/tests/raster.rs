@@ -273,3 +273,11 @@ fn wireframe_draws_the_edges_and_only_them() {
         .count();
     assert!((80..400).contains(&dark), "{dark} dark pixels");
 }
+
+#[test]
+fn wireframe_of_tiny_triangles_stays_legible() {
+    // About one pixel each: full lines would leave nothing but black.
+    let lines = picture(&sheet(0.3, 1), Style::Wireframe);
+    let mean = lines.iter().map(|pixel| f32::from(pixel[0])).sum::<f32>() / lines.len() as f32;
+    assert!(mean > 100.0, "{mean}");
+}

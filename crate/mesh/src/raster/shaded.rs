@@ -18,6 +18,8 @@ const COLOR_AMBIENT: f32 = 0.75;
 const BACK: f32 = 0.55;
 /// Half the width of a line.
 const LINE_PX: f32 = 0.7;
+/// Triangles from this height on get full lines.
+const OPEN_PX: f32 = 8.0;
 /// Near to far, sRGB.
 const DEPTH_RAMP: [Vec3; 5] = [
     Vec3::new(253.0, 231.0, 37.0),
@@ -153,15 +155,21 @@ impl<'a> Hit<'a> {
         side * (ambient + (1.0 - ambient) * cosine.min(1.0))
     }
 
-    /// 1 away from the triangle's edges, dark on them, with a soft step.
+    /// 1 away from the triangle's edges, dark on them, with a soft step. Lines pale on triangles of a few pixels, which
+    /// they would fill.
     fn ink(&self, camera: &Pinhole) -> f32 {
-        let distance_px = self.planes.map(|plane| {
-            let per_column = plane.x / camera.fx;
-            let per_row = plane.y / camera.fy;
-            plane.dot(self.ray).abs() / per_column.hypot(per_row).max(f32::MIN_POSITIVE)
-        });
-        let nearest = distance_px.into_iter().fold(f32::INFINITY, f32::min);
-        0.15 + 0.85 * (nearest - LINE_PX + 0.5).clamp(0.0, 1.0)
+        let products = self.planes.map(|plane| plane.dot(self.ray).abs());
+        let whole: f32 = products.iter().sum();
+        let (mut distance_px, mut height_px) = (f32::INFINITY, f32::INFINITY);
+        for (plane, product) in self.planes.iter().zip(products) {
+            let per_pixel = (plane.x / camera.fx).hypot(plane.y / camera.fy);
+            let pixels = 1.0 / per_pixel.max(f32::MIN_POSITIVE);
+            distance_px = distance_px.min(product * pixels);
+            height_px = height_px.min(whole * pixels);
+        }
+        let line = (LINE_PX + 0.5 - distance_px).clamp(0.0, 1.0);
+        let strength = (height_px / OPEN_PX).min(1.0);
+        1.0 - 0.85 * line * strength
     }
 }
 
