@@ -8,7 +8,7 @@
 use crate::bounds;
 use crate::free_list::FreeList;
 
-use glam::Mat4;
+use glam::{Mat4, Vec3};
 use mesh::Bounds;
 use mesh::soup::{VERTEX_FLOATS, VERTEX_STRIDE_BYTES};
 use std::collections::BTreeMap;
@@ -161,6 +161,11 @@ impl Arena {
     pub fn bytes(&self) -> u64 {
         let blocks: u64 = self.pages.iter().map(|page| u64::from(page.blocks)).sum();
         blocks * BLOCK_BYTES
+    }
+
+    /// Points around the surface for [`crate::Controls::set_outline`], a scan's strays left out; empty when it is.
+    pub fn outline(&self) -> Vec<Vec3> {
+        bounds::outline(self.slots.keys(), self.brick_size_m)
     }
 
     /// The box around all bricks, exact to one brick; `None` when empty.

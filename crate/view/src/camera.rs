@@ -4,14 +4,13 @@
 //! (no look-at), so nothing degenerates when looking straight down. Roll is there because
 //! captured photos have it: looking through one shows the world as the photo does.
 
-use crate::bounds::corners;
 use glam::{Affine3A, Mat3A, Mat4, Vec2, Vec3, Vec4};
 use mesh::Bounds;
 use mesh::camera::Pinhole;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// Nearest distance that is drawn.
-pub const NEAR_M: f32 = 0.02;
+pub(crate) const NEAR_M: f32 = 0.02;
 
 /// Vertical field of view unless a photo's own is taken over.
 const DEFAULT_FOV_Y_RAD: f32 = 0.9;
@@ -169,24 +168,32 @@ impl OrbitCamera {
         ndc * self.tan_half_fov(aspect) + self.lens_shift
     }
 
-    /// Moves back, heading kept, until `bounds` fills the picture with a small margin; the lens
-    /// and the horizon go back to normal.
-    pub fn fit(&mut self, bounds: &Bounds, aspect: f32) {
+    /// Moves, heading kept, to where `points_m` fill the picture with a small margin; the lens and the horizon go back
+    /// to normal. No points, no move.
+    pub fn fit(&mut self, points_m: &[Vec3], aspect: f32) {
+        let Some(bounds) = Bounds::of(points_m) else {
+            return;
+        };
         self.lens_shift = Vec2::ZERO;
         self.roll_rad = 0.0;
         self.fov_y_rad = DEFAULT_FOV_Y_RAD;
-        self.pivot_m = bounds.center();
         let (right, up, forward) = self.axes();
-        let half = self.tan_half_fov(aspect);
-        let margin = 1.06;
-        self.distance_m = corners(bounds)
-            .into_iter()
-            .map(|corner| {
-                let p = corner - self.pivot_m;
-                let sideways = (p.dot(right).abs() / half.x).max(p.dot(up).abs() / half.y);
-                sideways * margin - p.dot(forward)
-            })
-            .fold(0.3, f32::max);
+        let half = self.tan_half_fov(aspect) / 1.1;
+        // A point at x, z (right, ahead) is in the picture of an eye at c, -d when |x - c| <= (d + z) * half. So the
+        // two largest of x - z * half and -x - z * half give the eye; up and down likewise.
+        let center_m = bounds.center();
+        let farthest = |axis: Vec3, half: f32| {
+            let reach = |p: &Vec3| (p - center_m).dot(axis) - (p - center_m).dot(forward) * half;
+            points_m.iter().map(reach).fold(f32::NEG_INFINITY, f32::max)
+        };
+        let eye = |axis: Vec3, half: f32| {
+            let (ahead, behind) = (farthest(axis, half), farthest(-axis, half));
+            ((ahead - behind) * 0.5, (ahead + behind) * 0.5 / half)
+        };
+        let (aside_m, distance_x_m) = eye(right, half.x);
+        let (above_m, distance_y_m) = eye(up, half.y);
+        self.pivot_m = center_m + right * aside_m + up * above_m;
+        self.distance_m = distance_x_m.max(distance_y_m).max(0.3);
     }
 
     /// Heading of the first view and of the home key: over a corner, looking down.

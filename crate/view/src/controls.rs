@@ -7,7 +7,6 @@
 use crate::camera::nearest_turn;
 use crate::{Input, OrbitCamera, PointerKind, Viewport};
 use glam::{Affine3A, Vec2, Vec3};
-use mesh::Bounds;
 use mesh::camera::Pinhole;
 use std::collections::BTreeSet;
 use std::f32::consts::{FRAC_PI_2, PI};
@@ -38,7 +37,7 @@ pub struct Controls {
     viewport: Viewport,
     pointers: Vec<Pointer>,
     held: BTreeSet<String>,
-    bounds: Option<Bounds>,
+    outline_m: Vec<Vec3>,
     photo: Option<(Affine3A, Pinhole)>,
     reduced_motion: bool,
     untouched: bool,
@@ -57,7 +56,7 @@ impl Default for Controls {
             },
             pointers: Vec::new(),
             held: BTreeSet::new(),
-            bounds: None,
+            outline_m: Vec::new(),
             photo: None,
             reduced_motion: false,
             untouched: true,
@@ -82,21 +81,19 @@ impl Controls {
         self.reduced_motion = reduced;
     }
 
-    /// Tells how far the surface reaches. Until the visitor first moves the camera it follows the
+    /// Tells where the surface is, by points around it. Until the visitor first moves the camera it follows the
     /// growing mesh; after that only [`Controls::home`] and [`Controls::fit`] use it.
-    pub fn set_bounds(&mut self, bounds: Bounds) {
-        self.bounds = Some(bounds);
+    pub fn set_outline(&mut self, points_m: Vec<Vec3>) {
+        self.outline_m = points_m;
         if self.untouched {
-            self.goal.fit(&bounds, self.viewport.aspect());
+            self.goal.fit(&self.outline_m, self.viewport.aspect());
         }
     }
 
     /// Frames everything from the present heading.
     pub fn fit(&mut self) {
         self.photo = None;
-        if let Some(bounds) = self.bounds {
-            self.goal.fit(&bounds, self.viewport.aspect());
-        }
+        self.goal.fit(&self.outline_m, self.viewport.aspect());
     }
 
     /// Frames everything from the first view's heading, and follows the growing mesh again.

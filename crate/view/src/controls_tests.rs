@@ -1,7 +1,15 @@
 use super::*;
+use crate::bounds::corners;
+use mesh::Bounds;
 
 const WIDTH: f32 = 800.0;
 const HEIGHT: f32 = 600.0;
+
+/// The corners of a room around the origin, `half` to the sides and `half.z` high.
+fn box_of(half: Vec3) -> Vec<Vec3> {
+    let min = Vec3::new(-half.x, -half.y, 0.0);
+    corners(&Bounds { min, max: half }).to_vec()
+}
 
 fn controls() -> Controls {
     let mut controls = Controls::default();
@@ -10,10 +18,7 @@ fn controls() -> Controls {
         height_px: HEIGHT as u32,
         scale: 2.0,
     });
-    controls.set_bounds(Bounds {
-        min: Vec3::new(-2.0, -1.5, 0.0),
-        max: Vec3::new(2.0, 1.5, 2.5),
-    });
+    controls.set_outline(box_of(Vec3::new(2.0, 1.5, 2.5)));
     settle(&mut controls);
     controls
 }
@@ -243,20 +248,13 @@ fn dragging_while_flying_turns_the_head() {
 fn the_view_follows_the_growing_mesh_until_it_is_touched() {
     let mut controls = controls();
     let near = controls.camera().distance_m;
-    let grown = Bounds {
-        min: Vec3::new(-8.0, -6.0, 0.0),
-        max: Vec3::new(8.0, 6.0, 3.0),
-    };
-    controls.set_bounds(grown);
+    controls.set_outline(box_of(Vec3::new(8.0, 6.0, 3.0)));
     settle(&mut controls);
     assert!(controls.camera().distance_m > 2.0 * near);
 
     drag(&mut controls, 0, MIDDLE, MIDDLE + Vec2::new(9.0, 0.0));
     let held = *controls.camera();
-    controls.set_bounds(Bounds {
-        max: Vec3::new(30.0, 6.0, 3.0),
-        ..grown
-    });
+    controls.set_outline(box_of(Vec3::new(30.0, 6.0, 3.0)));
     settle(&mut controls);
     assert_eq!(*controls.camera(), held);
 

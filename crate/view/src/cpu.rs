@@ -65,6 +65,11 @@ impl CpuPainter {
         (floats / (3 * VERTEX_FLOATS)) as u64
     }
 
+    /// Points around the surface for [`crate::Controls::set_outline`], a scan's strays left out; empty when it is.
+    pub fn outline(&self) -> Vec<Vec3> {
+        bounds::outline(self.bricks.keys(), self.brick_size_m)
+    }
+
     /// The box around all bricks, exact to one brick; `None` when empty.
     pub fn bounds(&self) -> Option<Bounds> {
         bounds::of_bricks(self.bricks.keys(), self.brick_size_m)

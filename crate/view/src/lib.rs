@@ -16,7 +16,7 @@ mod lines;
 mod look;
 
 pub use arena::{Arena, ArenaError};
-pub use camera::{NEAR_M, OrbitCamera, Ray};
+pub use camera::{OrbitCamera, Ray};
 pub use controls::Controls;
 pub use cpu::CpuPainter;
 pub use gpu::{GpuPainter, Picking, Scene};

@@ -96,6 +96,7 @@ impl Canvas {
         if area == 0.0 || (back && cull_back) {
             return;
         }
+        let per_area = area.recip();
         let low = a.min(b).min(c) - 0.5;
         let high = a.max(b).max(c) - 0.5;
         // Casts saturate, so corners far outside end at the picture's rim.
@@ -108,9 +109,9 @@ impl Canvas {
                 let p = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
                 // An edge's pixels may go to both neighbours: the nearer wins, and no gap can open.
                 let shares = [
-                    (c - b).perp_dot(p - b) / area,
-                    (a - c).perp_dot(p - c) / area,
-                    (b - a).perp_dot(p - a) / area,
+                    (c - b).perp_dot(p - b) * per_area,
+                    (a - c).perp_dot(p - c) * per_area,
+                    (b - a).perp_dot(p - a) * per_area,
                 ];
                 if shares.iter().any(|&share| share < 0.0) {
                     continue;

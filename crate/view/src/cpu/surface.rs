@@ -83,7 +83,7 @@ impl<'a> Shader<'a> {
             .map(|i| 1.0 - smoothstep(per_px[i] * 1.3 * self.scale, shares[i]))
             .fold(0.0, f32::max);
         let crowd = per_px.into_iter().fold(0.0, f32::max);
-        line * (1.0 - smoothstep(0.6 - 0.15, crowd - 0.15))
+        line.lerp(0.35, smoothstep(0.7 - 0.2, crowd - 0.2))
     }
 }
 

@@ -5,6 +5,7 @@ struct Stroke {
     @location(0) colour: vec4f,
 }
 
+// As camera.rs has it.
 const NEAR_M = 0.02;
 
 @vertex

@@ -54,13 +54,13 @@ fn ramp(depth_m: f32) -> vec3f {
     return mix(view.ramp[stop].rgb, view.ramp[stop + 1u].rgb, t - f32(stop));
 }
 
-// 1 on an edge, fading over one pixel, and away where triangles are too small to tell apart.
+// 1 on an edge, fading over one pixel; an even tint where triangles are too small to tell apart.
 fn edge(barycentric: vec3f) -> f32 {
     let per_px = fwidth(barycentric);
     let reach = smoothstep(vec3f(0.0), per_px * 1.3 * view.wire.a, barycentric);
     let line = 1.0 - min(reach.x, min(reach.y, reach.z));
     let crowd = max(per_px.x, max(per_px.y, per_px.z));
-    return line * (1.0 - smoothstep(0.15, 0.6, crowd));
+    return mix(line, 0.35, smoothstep(0.2, 0.7, crowd));
 }
 
 @fragment
