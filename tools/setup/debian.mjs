@@ -1,7 +1,7 @@
 // Debian's way to the wasm32 target: its rustc-web builds its own standard library for wasm, and rustup links it as the toolchain `debian`.
 import { cpSync, mkdirSync, mkdtempSync, readdirSync, readlinkSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
-import { join } from 'node:path';
+import { basename, join } from 'node:path';
 import { must, write } from '../run.mjs';
 import { install } from './apt.mjs';
 
@@ -10,9 +10,8 @@ const crates = 'std,panic_abort,panic_unwind,test,proc_macro';
 
 export async function installDebianTarget(target) {
   await install(['rustc-web', 'cargo-web', 'rust-web-src', 'rust-web-llvm']);
-  // rust-lld is a link into the LLVM release that this rustc was built with; its package brings the linker itself.
-  const release = /llvm-(\d+)/.exec(readlinkSync('/usr/bin/rust-lld'))?.[1];
-  if (release) await install([`lld-${release}`]);
+  // rust-lld is a link to the linker of the LLVM that this rustc was built with, which is a package of the same name (`lld-22`).
+  await install([basename(readlinkSync('/usr/bin/rust-lld'))]);
 
   const folder = mkdtempSync(join(tmpdir(), 'wasm-std-'));
   try {

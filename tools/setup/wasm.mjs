@@ -2,7 +2,7 @@
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { Missing, run, which } from '../run.mjs';
+import { Missing, must, run, which } from '../run.mjs';
 import { candidate, mayInstall } from './apt.mjs';
 import { installDebianTarget } from './debian.mjs';
 import { prove, proven } from './state.mjs';
@@ -22,13 +22,14 @@ async function toolchainKey(toolchain) {
   return existsSync(folder.output.trim()) ? version.output : null;
 }
 
-/** Compiles and links an empty library and an empty test for wasm. */
-async function links(toolchain) {
+/** Compiles and links an empty library and an empty test for wasm, or throws what the compiler said. */
+async function link(toolchain) {
   const folder = mkdtempSync(join(tmpdir(), 'wasm-probe-'));
   try {
     const common = ['--edition', '2024', '--target', target, '-'];
-    const compile = async (source, ...kind) => (await run('rustc', [...kind, ...common], { env: toolchainEnv(toolchain), input: source, cwd: folder })).code === 0;
-    return (await compile(library, '--crate-type', 'cdylib', '-o', 'lib.wasm')) && (await compile(test, '--test', '-o', 'test.wasm'));
+    const compile = (source, ...kind) => must('rustc', [...kind, ...common], { env: toolchainEnv(toolchain), input: source, cwd: folder });
+    await compile(library, '--crate-type', 'cdylib', '-o', 'lib.wasm');
+    await compile(test, '--test', '-o', 'test.wasm');
   } finally {
     rmSync(folder, { recursive: true, force: true });
   }
@@ -36,7 +37,12 @@ async function links(toolchain) {
 
 async function works(toolchain) {
   const key = await toolchainKey(toolchain);
-  if (key === null || !(await links(toolchain))) return false;
+  if (key === null) return false;
+  try {
+    await link(toolchain);
+  } catch {
+    return false;
+  }
   prove('wasm', { toolchain, key });
   return true;
 }
@@ -62,6 +68,7 @@ export async function wasmTarget(say) {
     say("rustup cannot download it; Debian's rustc-web builds it instead (about a minute)");
     await installDebianTarget(target);
     if (await works('debian')) return 'debian';
+    await link('debian');
   }
   throw new Missing(`run: rustup target add ${target}`);
 }

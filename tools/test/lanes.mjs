@@ -53,9 +53,6 @@ export const lanes = {
     return crates.map((path) => ({ program: 'wasm-pack', args: ['test', '--node', '--mode', 'no-install', path, '--profile', 'web'], env, count: 'cargo' }));
   },
   browser: async () => [nodeTests('tests/browser')],
-  reference: async () => [
-    cargo(buildEnv(), 'build', '--release', '--workspace', '--bins'),
-    { program: python, args: ['-m', 'unittest', 'discover', '-v', '-s', 'tests/reference', '-p', 'test_*.py'], env: { ...gpu(buildEnv()), IPDRECON: at('target/release/ipdrecon') }, count: 'python' },
-  ],
+  reference: async () => [{ program: python, args: ['-m', 'unittest', 'discover', '-v', '-s', 'tests/reference', '-p', 'test_*.py'], env: buildEnv(), count: 'python' }],
   budget: async () => [nodeTests('tests/budget')],
 };
