@@ -245,7 +245,7 @@ def main():
         "pred_depth_both_sides_m": cast(pred, views[0], cull=False).round(4).ravel().tolist(),
         "visibility": box
         | {
-            "observed_share": observed.mean(),
+            "observed_points": int(observed.sum()),
             "probes": probes.tolist(),
             "visible": visible(probes).astype(int).tolist(),
         },
@@ -257,7 +257,7 @@ def main():
     path.write_text(json.dumps(golden, separators=(",", ":")) + "\n")
     for name in ("plain_2000", "transformer_fusion", "transformer_fusion_visible", "vortx"):
         print(name, {key: round(float(value), 5) for key, value in golden[name].items()})
-    print("observed share", observed.mean(), "probes visible", visible(probes).sum(), "of", len(probes))
+    print("observed", observed.sum(), "of", observed.size, "probes visible", visible(probes).sum(), "of", len(probes))
     for name, row in golden["robustness"].items():
         print(name, {k: round(100 * v, 3) for k, v in row.items() if isinstance(v, float)})
 

@@ -140,8 +140,9 @@ fn visibility(golden: &Value) -> Visibility {
 fn visibility_agrees_at_every_probe() {
     let golden = golden();
     let (expected, found) = (&golden["visibility"], visibility(&golden));
-    let share = number(&expected["observed_share"]);
-    assert!((found.observed_share() - share).abs() < 2e-4);
+    // A point or two may lie on the edge of a pixel.
+    let count = number(&expected["observed_points"]);
+    assert!((found.observed_points() as f64 - count).abs() <= 2.0);
     let answers = floats(&expected["visible"]);
     for (probe, answer) in points(&expected["probes"]).into_iter().zip(answers) {
         assert_eq!(found.visible(probe), answer == 1.0, "{probe}");

@@ -111,7 +111,7 @@ fn what_no_frame_observed_is_not_held_against_a_prediction() {
         min: Vec3::new(-1.2, -1.2, -1.0),
         max: Vec3::new(1.2, 1.2, 1.0),
     };
-    let frames = std::iter::once((view.camera, view.camera_from_world, depth_m));
+    let frames = std::iter::once((view.camera, view.camera_from_world, depth_m.clone()));
     let visibility = Visibility::from_depth(frames, bounds, 0.04, 0.12);
     assert!(
         visibility.visible(Vec3::new(0.1, 0.2, 0.0)),
@@ -136,6 +136,17 @@ fn what_no_frame_observed_is_not_held_against_a_prediction() {
     let fair = protocol::transformer_fusion(&pred, &gt, Some(&visibility), 1);
     assert_eq!(fair.precision, 1.0, "{fair:?}");
     assert!(fair.predicted_points < blamed.predicted_points / 2 + 1000);
+
+    // A stray vertex a thousand kilometres away makes the lattice vast, and no difference.
+    let vast = Bounds {
+        max: Vec3::splat(1e6),
+        ..bounds
+    };
+    let frames = std::iter::once((view.camera, view.camera_from_world, depth_m.clone()));
+    let stray = Visibility::from_depth(frames, vast, 0.04, 0.12);
+    assert!(stray.visible(Vec3::new(0.1, 0.2, 0.0)));
+    assert!(!stray.visible(Vec3::new(0.1, 0.2, -0.3)));
+    assert!(!stray.visible(Vec3::splat(9e5)));
 
     // With nothing visible at all the scene is scored as if there were no mask.
     let blind = Visibility::from_depth(std::iter::empty(), bounds, 0.04, 0.12);
