@@ -17,11 +17,14 @@ impl Gpu {
     /// The first adapter, with WebGPU's default limits and any validation error turned into a
     /// panic; `None`, said aloud, where there is no adapter.
     pub fn open() -> Option<Self> {
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+            backends: wgpu::Backends::PRIMARY,
+            ..wgpu::InstanceDescriptor::new_without_display_handle()
+        });
         let adapter =
             pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()));
         let Ok(adapter) = adapter else {
-            println!("skipped: no graphics adapter (set VK_ICD_FILENAMES to one that is there)");
+            println!("skipped: no Vulkan, Metal or Direct3D 12 adapter");
             return None;
         };
         let (device, queue) =
