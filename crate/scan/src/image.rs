@@ -246,7 +246,6 @@ pub(crate) fn decode_depth(bytes: &[u8], code: DepthCode) -> Result<DepthImage, 
         }
     }
     let pixels = png_pixels(reader, bytes, DEPTH)?;
-    let metres_per_unit = code.units_per_m.recip();
     let depth_m = pixels
         .chunks_exact(2)
         .map(|pair| u16::from_be_bytes([pair[0], pair[1]]))
@@ -254,7 +253,7 @@ pub(crate) fn decode_depth(bytes: &[u8], code: DepthCode) -> Result<DepthImage, 
             if Some(stored) == code.invalid {
                 0.0
             } else {
-                f32::from(stored) * metres_per_unit
+                f32::from(stored) / code.units_per_m
             }
         })
         .collect();

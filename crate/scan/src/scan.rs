@@ -158,6 +158,10 @@ impl Scan {
         decode_depth(self.source.as_ref(), self.frame(frame)?, self.depth_code)
     }
 
+    pub(crate) fn depth_units_per_m(&self) -> f32 {
+        self.depth_code.units_per_m
+    }
+
     fn frame(&self, index: usize) -> Result<&Frame, FrameError> {
         self.frames.get(index).ok_or_else(|| {
             FrameError::Missing(Box::new(

@@ -1,4 +1,4 @@
-//! Do poses and depth belong together? A surface seen by one keyframe must lie where the next one sees it. Where it
+//! Do poses and depth belong together? A surface seen by one keyframe must lie where a later one sees it. Where it
 //! does not, the usual mistakes (inverse poses, other camera axes, another depth unit) are tried, and the one that
 //! makes them agree is named.
 
@@ -13,12 +13,15 @@ use super::Look;
 
 /// Pairs of keyframes compared.
 const PAIRS: usize = 12;
+/// Distance and turn of the camera between the two.
+const PARTNER_M: f64 = 0.4;
+const PARTNER_TURN_DEG: f64 = 20.0;
 /// Relative difference in depth within which two views agree.
 const TOLERANCE: f64 = 0.05;
-/// Real scans reach 0.8 and more; wrong poses stay near 0.2.
-const DOUBTFUL_SHARE: f64 = 0.5;
+/// Good scans reach 0.99; wrong poses stay between 0.2 and 0.6.
+const DOUBTFUL_SHARE: f64 = 0.75;
 /// An explanation must do clearly better than the poses as they are.
-const CONVINCING_GAIN: f64 = 0.25;
+const CONVINCING_GAIN: f64 = 0.15;
 const GRID: u32 = 40;
 
 struct View {
@@ -39,7 +42,6 @@ pub(super) fn examine(
         Look::All => PAIRS,
         Look::Sample(frames) => PAIRS.min(frames / 2),
     };
-    let starts = super::chosen(keys.len().saturating_sub(1), Look::Sample(pairs));
     let view = |key: usize| {
         let depth = scan.depth(key).ok()??;
         let frame = &scan.frames()[key];
@@ -49,9 +51,9 @@ pub(super) fn examine(
             depth,
         })
     };
-    let pairs: Vec<(View, View)> = starts
+    let pairs: Vec<(View, View)> = super::chosen(keys.len(), Look::Sample(pairs))
         .into_iter()
-        .filter_map(|at| Some((view(keys[at])?, view(keys[at + 1])?)))
+        .filter_map(|at| Some((view(keys[at])?, view(partner(scan, &keys[at..])?)?)))
         .collect();
     let share = |change: &dyn Fn(DAffine3) -> DAffine3, depth_factor: f64| {
         let mut tally = Tally::default();
@@ -64,25 +66,29 @@ pub(super) fn examine(
     let as_is = share(&|pose| pose, 1.0)?;
     if as_is < DOUBTFUL_SHARE {
         let flip = DAffine3::from_mat3(DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0)));
-        let explanations: [(&str, f64); 5] = [
+        let unit = |wrong: &str| {
+            let units_per_m = scan.depth_units_per_m();
+            format!("Depth seems to be {wrong}: this layout stores a metre as {units_per_m}")
+        };
+        let explanations: [(String, f64); 5] = [
             (
-                "The poses seem to be world-to-camera: store their inverses",
+                "The poses seem to be world-to-camera: store their inverses".to_owned(),
                 share(&|pose| pose.inverse(), 1.0).unwrap_or(0.0),
             ),
             (
-                "The poses seem to use OpenGL camera axes (y up, z backward): negate their second and third columns",
+                "The poses seem to use OpenGL camera axes (y up, z backward): negate their second and third columns".to_owned(),
                 share(&|pose| pose * flip, 1.0).unwrap_or(0.0),
             ),
             (
-                "The poses seem to be world-to-camera with OpenGL axes: invert them, then negate the second and third columns",
+                "The poses seem to be world-to-camera with OpenGL axes: invert them, then negate the second and third columns".to_owned(),
                 share(&|pose| pose.inverse() * flip, 1.0).unwrap_or(0.0),
             ),
             (
-                "Depth seems to be stored in 1/5000 m: this layout takes millimetres",
+                unit("5 times too large"),
                 share(&|pose| pose, 0.2).unwrap_or(0.0),
             ),
             (
-                "Depth seems to be stored in millimetres: this layout takes 1/5000 m",
+                unit("5 times too small"),
                 share(&|pose| pose, 5.0).unwrap_or(0.0),
             ),
         ];
@@ -92,7 +98,7 @@ pub(super) fn examine(
             .max_by(|a, b| a.1.total_cmp(&b.1));
         log.add(
             Finding::new(Severity::Warning, "poses-disagree")
-                .expected("neighbouring views whose depths agree")
+                .expected("views whose depths agree where they overlap")
                 .found(format!("agreement in {:.0} % of the pixels", as_is * 100.0))
                 .advice(match best {
                     Some((advice, share)) => {
@@ -105,6 +111,20 @@ pub(super) fn examine(
         );
     }
     Some(as_is)
+}
+
+/// The first later keyframe that stands far enough from the first one for wrong poses to show, and still sees much
+/// of the same.
+fn partner(scan: &Scan, keys: &[usize]) -> Option<usize> {
+    let (first, later) = keys.split_first()?;
+    let from = &scan.frames()[*first].pose;
+    let far_enough = |key: &&usize| {
+        let to = &scan.frames()[**key].pose;
+        let turned = from.matrix3.z_axis.angle_between(to.matrix3.z_axis);
+        from.translation.distance(to.translation) > PARTNER_M
+            || turned.to_degrees() > PARTNER_TURN_DEG
+    };
+    later.iter().find(far_enough).copied()
 }
 
 #[derive(Default)]

@@ -47,7 +47,7 @@ pub struct Report {
     pub depth_measured_share: Option<f64>,
     /// Median of the examined frames' median depth.
     pub depth_median_m: Option<f64>,
-    /// Share of depth pixels that agree with the next examined keyframe's depth within 5 %.
+    /// Share of depth pixels that agree within 5 % with what a later keyframe, some 40 cm on, sees there.
     pub depth_agreement_share: Option<f64>,
     /// Length of the camera's path.
     pub path_length_m: f64,
@@ -78,6 +78,8 @@ pub struct GravityReport {
     pub camera_tilt_deg: f64,
 }
 
+/// Rooms are seen from these distances.
+const USUAL_DEPTH_M: std::ops::Range<f64> = 0.45..7.0;
 /// A depth picture with less than this is called empty.
 const EMPTY_SHARE: f64 = 0.05;
 
@@ -94,6 +96,22 @@ pub fn examine(scan: &Scan, depth_of_look: Look) -> Report {
     let depth_agreement_share = agreement::examine(scan, &keys, depth_of_look, &mut log);
 
     let with = |has: fn(&&crate::Frame) -> bool| frames.iter().filter(has);
+    let depth_median_m = median(pictures.depth_medians_m);
+    if let Some(median_m) = depth_median_m.filter(|m| !USUAL_DEPTH_M.contains(m)) {
+        log.add(
+            Finding::new(Severity::Warning, "depth-unit-doubtful")
+                .expected(format!(
+                    "a median depth between {} and {} m",
+                    USUAL_DEPTH_M.start, USUAL_DEPTH_M.end
+                ))
+                .found(format!("{median_m:.2} m"))
+                .advice(format!(
+                    "In this layout a metre is stored as {}: check that depth was exported so",
+                    scan.depth_units_per_m()
+                ))
+                .frames(pictures.measured_shares.len()),
+        );
+    }
     let gravity = scan.gravity();
     Report {
         name: scan.name().to_owned(),
@@ -106,7 +124,7 @@ pub fn examine(scan: &Scan, depth_of_look: Look) -> Report {
         color_camera: with(|f| f.color.is_some()).next().map(|f| f.color_camera),
         depth_camera: with(|f| f.depth.is_some()).next().map(|f| f.depth_camera),
         depth_measured_share: mean(&pictures.measured_shares),
-        depth_median_m: median(pictures.depth_medians_m),
+        depth_median_m,
         depth_agreement_share,
         path_length_m: path.length_m,
         path_extent_m: path.extent_m,

@@ -139,6 +139,12 @@ impl Files {
         self.0.retain(|(other, _)| other != path);
     }
 
+    /// Leaves out all paths that start so.
+    pub fn without(mut self, prefix: &str) -> Files {
+        self.0.retain(|(path, _)| !path.starts_with(prefix));
+        self
+    }
+
     pub fn get(&self, path: &str) -> &[u8] {
         &self.0.iter().find(|(other, _)| other == path).unwrap().1
     }
@@ -175,4 +181,64 @@ pub fn assert_tells(text: &str, parts: &[&str]) {
     for part in parts {
         assert!(text.contains(part), "\"{part}\" is not in \"{text}\"");
     }
+}
+
+/// `count` frames as ScanNet exports them, in the folder `room`: larger colour, smaller depth, Z up, facing +y.
+pub fn scannet(count: usize) -> Files {
+    let mut files = Files(Vec::new());
+    files.set(
+        "room/intrinsic/intrinsic_color.txt",
+        "120 0 63.5 0\n0 121 47.5 0\n0 0 1 0\n0 0 0 1\n",
+    );
+    files.set(
+        "room/intrinsic/intrinsic_depth.txt",
+        "60 0 31.5 0\n0 61 23.5 0\n0 0 1 0\n0 0 0 1\n",
+    );
+    for index in 0..count {
+        let pose = room::camera_at([0.2 * index as f64, 0.0, 1.5], 90.0, 0.0, 0.0);
+        files.set(
+            &format!("room/color/{index}.jpg"),
+            jpeg(128, 96, &texture(128, 96)),
+        );
+        files.set(&format!("room/depth/{index}.png"), flat_depth(64, 48, 2500));
+        files.set(&format!("room/pose/{index}.txt"), pose_text(&pose));
+    }
+    files
+}
+
+/// `count` frames in the TUM RGB-D layout, 10 a second, in a folder: depth 8 ms after colour, poses every 50 ms on
+/// a straight line of 1 m/s along x, facing +y.
+pub fn tum(folder: &str, count: usize) -> Files {
+    let mut files = Files(Vec::new());
+    let [mut rgb, mut depth, mut poses] = ["# list\n"; 3].map(str::to_owned);
+    for index in 0..count {
+        let time = 100.0 + 0.1 * index as f64;
+        let (color, deep) = (format!("{time:.6}"), format!("{:.6}", time + 0.008));
+        files.set(
+            &format!("{folder}/rgb/{color}.png"),
+            png_rgb(64, 48, &texture(64, 48)),
+        );
+        files.set(
+            &format!("{folder}/depth/{deep}.png"),
+            flat_depth(64, 48, 10_000),
+        );
+        rgb += &format!("{color} rgb/{color}.png\n");
+        depth += &format!("{deep} depth/{deep}.png\n");
+    }
+    let turn = glam::DQuat::from_mat3(&room::camera_at([0.0; 3], 90.0, 0.0, 0.0).matrix3);
+    for step in 0..=2 * count + 1 {
+        let moved = 0.05 * step as f64;
+        poses += &format!(
+            "{:.4} {moved:.4} 0 1.5 {:.6} {:.6} {:.6} {:.6}\n",
+            100.0 + moved,
+            turn.x,
+            turn.y,
+            turn.z,
+            turn.w
+        );
+    }
+    files.set(&format!("{folder}/rgb.txt"), rgb);
+    files.set(&format!("{folder}/depth.txt"), depth);
+    files.set(&format!("{folder}/groundtruth.txt"), poses);
+    files
 }
