@@ -179,7 +179,7 @@ fn real(name: &str) -> Option<Mesh> {
             Err(error) => panic!("{}: {error}", path.display()),
         },
         Err(_) => {
-            eprintln!("skipped: no scan \"{name}\" beside the repository");
+            println!("skipped: ../shared/scans/{name}/gt.ply is absent");
             None
         }
     }
