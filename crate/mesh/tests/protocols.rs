@@ -194,20 +194,20 @@ fn real_ground_truth_against_itself_and_shifted() {
         let Some(gt) = real(name) else { continue };
         assert_eq!((gt.positions.len(), gt.triangles.len()), (vertices, faces));
         assert_eq!(gt.validate(), Ok(()));
-        let itself = protocol::plain(&gt, &gt, 60_000, 1);
+        let itself = protocol::plain(&gt, &gt, 80_000, 1);
         assert!(
             itself.f_score > 0.998 && itself.chamfer_m < 0.02,
             "{name}: {itself:?}"
         );
         let mut shifted = gt.clone();
         shifted.positions.iter_mut().for_each(|p| p.x += 0.03);
-        let near = protocol::plain(&shifted, &gt, 60_000, 1);
+        let near = protocol::plain(&shifted, &gt, 80_000, 1);
         assert!(
             near.f_score > 0.995 && near.chamfer_m > itself.chamfer_m + 0.003,
             "{near:?}"
         );
         shifted.positions.iter_mut().for_each(|p| p.x += 0.12);
-        let far = protocol::plain(&shifted, &gt, 60_000, 1);
+        let far = protocol::plain(&shifted, &gt, 80_000, 1);
         assert!(far.f_score < 0.9, "{name}: {far:?}");
     }
 }
