@@ -73,10 +73,14 @@ fn bricks_come_change_and_go() {
 fn bricks_are_copied_on_the_gpu_from_any_place_in_a_buffer() {
     let Some(gpu) = Gpu::open() else { return };
     let mut arena = gpu.arena();
-    arena
-        .insert_from_slice(&gpu.queue, [0, 1, 0], &square(1, BLUE, 6))
-        .unwrap();
-    let (first, second) = (square(-1, RED, 3), square(1, GREEN, 2));
+    for y in [0, 1, 2] {
+        let soup = square(y, BLUE, 6);
+        arena
+            .insert_from_slice(&gpu.queue, [0, y, 0], &soup)
+            .unwrap();
+    }
+    assert_eq!(seen(&gpu, &arena), "..bbb");
+    let (first, second) = (square(-1, RED, 3), square(0, GREEN, 2));
     let all = [vec![9.0; 7], first.clone(), second.clone()].concat();
     let source = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: None,
@@ -94,11 +98,11 @@ fn bricks_are_copied_on_the_gpu_from_any_place_in_a_buffer() {
             .unwrap();
     };
     copy([0, -1, 0], 7, first.len() / 6);
-    copy([0, 1, 0], 7 + first.len(), second.len() / 6);
-    copy([0, 0, 0], 0, 0);
+    copy([0, 0, 0], 7 + first.len(), second.len() / 6);
+    copy([0, 1, 0], 0, 0);
     gpu.queue.submit([encoder.finish()]);
-    assert_eq!(seen(&gpu, &arena), ".r.g.");
-    assert_eq!(arena.triangle_count(), 18 + 8);
+    assert_eq!(seen(&gpu, &arena), ".rg.b");
+    assert_eq!(arena.triangle_count(), 18 + 8 + 72);
 }
 
 #[test]
