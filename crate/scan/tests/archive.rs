@@ -1,4 +1,5 @@
 //! Archives and folders as sources: the right bytes, little read, nothing trusted.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 

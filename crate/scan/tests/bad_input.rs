@@ -1,5 +1,6 @@
 //! Everything that can be wrong with a scan: the text names the file (and line), what was expected, what was found
 //! and what to do; the other frames go on where that is sensible.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! The doctor sees what is wrong with a scan and names the usual mistakes.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! Each layout is recognised by its content and comes out in the same canonical form.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 

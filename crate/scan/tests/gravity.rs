@@ -1,4 +1,5 @@
 //! Up is found in rooms seen by level, tilted, rolled and one-sided cameras, whatever the scan's own world is.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 
@@ -44,7 +45,7 @@ fn scan_of(room: &[Surface], poses: &[DAffine3], turn: DQuat, noise_at_1m_m: f64
 
 /// Opens the room in several worlds; up must be right to half a degree in each.
 fn assert_up_is_found(what: &str, room: &[Surface], poses: &[DAffine3], noise_at_1m_m: f64) {
-    for seed in 1..=6 {
+    for seed in 1..=3 {
         let turn = any_turn(seed);
         let scan = scan_of(room, poses, turn, noise_at_1m_m);
         let gravity = scan.gravity();

@@ -1,4 +1,5 @@
 //! A scan of 5,000 frames opens at once: poses are read, pictures are not.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 

@@ -74,7 +74,7 @@ pub(super) fn frames(
                 continue;
             }
             Err(finding) => {
-                log.add(finding);
+                log.add(*finding);
                 continue;
             }
         };

@@ -42,11 +42,10 @@ fn stems<'a>(
 
 pub(super) fn likeness(folder: &Folder<'_>) -> Likeness {
     let [color, depth, pose] = KINDS.map(|kind| stems(folder, kind).next().is_some());
+    let calibrated = folder.has(COLOR_INTRINSICS[0]) || folder.has(DEPTH_INTRINSICS[0]);
     match (color || depth, pose) {
         (true, true) => Likeness::Complete,
-        (true, false) if folder.has(COLOR_INTRINSICS[0]) || folder.has(DEPTH_INTRINSICS[0]) => {
-            Likeness::Partial
-        }
+        (true, false) if calibrated || (color && depth) => Likeness::Partial,
         _ => Likeness::None,
     }
 }

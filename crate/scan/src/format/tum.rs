@@ -6,6 +6,8 @@
 //! S = diag(1, -1, 1)) gives OpenCV cameras with a positive focal length in a right-handed world where -Y is up; the
 //! mirror is undone when something is exported.
 
+use std::collections::HashSet;
+
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::camera::Camera;
@@ -57,7 +59,9 @@ pub(super) fn likeness(folder: &Folder<'_>) -> Likeness {
     }
 }
 
+/// Path, and the line it is listed on.
 type Pictures = Vec<Timed<(String, u32)>>;
+type Picture<'a> = &'a Timed<(String, u32)>;
 
 pub(super) fn draft(folder: &Folder<'_>, log: &mut FindingLog) -> Result<Draft, ScanError> {
     let (colors, depths) = picture_lists(folder, log)?;
@@ -76,7 +80,7 @@ pub(super) fn draft(folder: &Folder<'_>, log: &mut FindingLog) -> Result<Draft, 
         (DVec3::Z, DMat3::IDENTITY)
     };
     Ok(Draft {
-        frames: frames(folder, colors, depths, &trajectory, cameras, log),
+        frames: frames(folder, &colors, &depths, &trajectory, cameras, log),
         depth_code: DepthCode {
             units_per_m: 5000.0,
             invalid: None,
@@ -234,90 +238,100 @@ fn published(folder: &Folder<'_>, icl: bool, log: &mut FindingLog) -> (String, [
 /// Frames at the times of the colour pictures, or of depth where there is no colour.
 fn frames(
     folder: &Folder<'_>,
-    colors: Pictures,
-    depths: Pictures,
+    colors: &Pictures,
+    depths: &Pictures,
     trajectory: &[Timed<DAffine3>],
     (color_camera, depth_camera): (Camera, Camera),
     log: &mut FindingLog,
 ) -> Vec<Frame> {
-    let limit_ms = MAX_DIFFERENCE_S * 1000.0;
-    let by_color = !colors.is_empty();
-    let (main, partners) = if by_color {
-        (&colors, timed::partners(&colors, &depths))
+    let pairs: Vec<(Option<Picture<'_>>, Option<Picture<'_>>)> = if colors.is_empty() {
+        depths.iter().map(|depth| (None, Some(depth))).collect()
     } else {
-        (&depths, vec![None; depths.len()])
+        let partners = timed::partners(colors, depths);
+        report_unpaired(colors, depths, &partners, log);
+        let partner = |at: Option<usize>| at.map(|index| &depths[index]);
+        let pair = |(color, at)| (Some(color), partner(at));
+        colors.iter().zip(partners).map(pair).collect()
     };
-    let image = |list: &Pictures, index: usize| ImageRef {
-        path: list[index].value.0.clone(),
+    let image = |picture: Picture<'_>| ImageRef {
+        path: picture.value.0.clone(),
     };
     let mut frames = Vec::new();
-    let mut unposed: Vec<&str> = Vec::new();
-    let mut shift_ms: f64 = 0.0;
-    for (index, (picture, partner)) in main.iter().zip(&partners).enumerate() {
-        let (color, depth) = if by_color {
-            (Some(index), *partner)
-        } else {
-            (None, Some(index))
-        };
+    let mut unposed = Vec::new();
+    let mut apart_s: f64 = 0.0;
+    for (color, depth) in pairs {
         // Depth carries the geometry, so the pose is taken at its moment.
-        let moment_s = depth.map_or(picture.time_s, |depth| depths[depth].time_s);
-        shift_ms = shift_ms.max((moment_s - picture.time_s).abs() * 1000.0);
-        let Some(pose) = timed::pose_at(trajectory, moment_s) else {
-            unposed.push(&picture.value.0);
+        let (Some(main), Some(moment)) = (color.or(depth), depth.or(color)) else {
             continue;
         };
-        let name = picture.value.0.rsplit('/').next().unwrap_or_default();
+        apart_s = apart_s.max((moment.time_s - main.time_s).abs());
+        let Some(pose) = timed::pose_at(trajectory, moment.time_s) else {
+            unposed.push(main);
+            continue;
+        };
+        let name = main.value.0.rsplit('/').next().unwrap_or_default();
         frames.push(Frame {
             name: name
                 .rsplit_once('.')
                 .map_or(name, |(stem, _)| stem)
                 .to_owned(),
             pose,
-            color: color.map(|index| image(&colors, index)),
-            depth: depth.map(|index| image(&depths, index)),
+            color: color.map(image),
+            depth: depth.map(image),
             color_camera,
             depth_camera,
-            timestamp_s: Some(picture.time_s),
+            timestamp_s: Some(main.time_s),
         });
     }
+    report_gap(
+        &unposed,
+        "a pose",
+        "These frames are left out; check that both files use the same clock",
+        log,
+    );
     log.add(
         Finding::new(Severity::Info, "matched-by-time")
             .at(folder.path())
             .expected("pictures and poses at the same moments")
-            .found(format!("colour and depth up to {shift_ms:.1} ms apart"))
+            .found(format!(
+                "colour and depth up to {:.1} ms apart",
+                apart_s * 1000.0
+            ))
             .advice("Poses are interpolated at the depth picture's moment"),
     );
-    let mut gap = |odd: &[&str], what: &str, advice: &str| {
-        if let [first, ..] = odd {
-            log.add(
-                Finding::new(Severity::Warning, "counts-differ")
-                    .at(*first)
-                    .expected(format!("{what} within {limit_ms:.0} ms of each picture"))
-                    .found(format!("{} without, this one first", odd.len()))
-                    .advice(advice)
-                    .frames(odd.len()),
-            );
-        }
-    };
-    gap(
-        &unposed,
-        "a pose",
-        "These frames are left out; check that both files use the same clock",
-    );
-    if by_color && !depths.is_empty() {
-        let alone = |(picture, partner): (&'_ Timed<(String, u32)>, &Option<usize>)| {
-            partner.is_none().then_some(picture.value.0.clone())
-        };
-        let odd: Vec<String> = colors.iter().zip(&partners).filter_map(alone).collect();
-        let odd: Vec<&str> = odd.iter().map(String::as_str).collect();
-        gap(&odd, "depth", "These frames give colour only");
-        let used: std::collections::HashSet<usize> = partners.iter().flatten().copied().collect();
-        let unused = |(index, picture): (usize, &Timed<(String, u32)>)| {
-            (!used.contains(&index)).then_some(picture.value.0.clone())
-        };
-        let odd: Vec<String> = depths.iter().enumerate().filter_map(unused).collect();
-        let odd: Vec<&str> = odd.iter().map(String::as_str).collect();
-        gap(&odd, "colour", "These depth pictures are left out");
-    }
     frames
+}
+
+/// Colour pictures without depth, and depth pictures without colour.
+fn report_unpaired(
+    colors: &Pictures,
+    depths: &Pictures,
+    partners: &[Option<usize>],
+    log: &mut FindingLog,
+) {
+    if depths.is_empty() {
+        return;
+    }
+    let alone = |(color, partner): (_, &Option<usize>)| partner.is_none().then_some(color);
+    let colors: Vec<Picture<'_>> = colors.iter().zip(partners).filter_map(alone).collect();
+    report_gap(&colors, "depth", "These frames give colour only", log);
+
+    let used: HashSet<usize> = partners.iter().flatten().copied().collect();
+    let unused = |(index, depth)| (!used.contains(&index)).then_some(depth);
+    let depths: Vec<Picture<'_>> = depths.iter().enumerate().filter_map(unused).collect();
+    report_gap(&depths, "colour", "These depth pictures are left out", log);
+}
+
+fn report_gap(odd: &[Picture<'_>], lack: &str, advice: &str, log: &mut FindingLog) {
+    if let [first, ..] = odd {
+        let limit_ms = MAX_DIFFERENCE_S * 1000.0;
+        log.add(
+            Finding::new(Severity::Warning, "counts-differ")
+                .at(&first.value.0)
+                .expected(format!("{lack} within {limit_ms:.0} ms of each picture"))
+                .found(format!("{} without, this one first", odd.len()))
+                .advice(advice)
+                .frames(odd.len()),
+        );
+    }
 }

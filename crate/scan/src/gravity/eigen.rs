@@ -4,37 +4,31 @@ use glam::{DMat3, DVec3};
 
 /// The unit eigenvector of the smallest eigenvalue of a symmetric matrix.
 pub(super) fn smallest(matrix: DMat3) -> DVec3 {
-    let mut a = matrix.to_cols_array_2d();
-    let mut v = DMat3::IDENTITY.to_cols_array_2d();
-    for _ in 0..12 {
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if a[p][q].abs() < f64::MIN_POSITIVE {
-                continue;
-            }
-            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
-            let c = t.hypot(1.0).recip();
-            let s = t * c;
-            // A <- J^T A J and V <- V J, with V stored by columns.
-            for k in 0..3 {
-                let (kp, kq) = (a[k][p], a[k][q]);
-                a[k][p] = c * kp - s * kq;
-                a[k][q] = s * kp + c * kq;
-            }
-            for k in 0..3 {
-                let (pk, qk) = (a[p][k], a[q][k]);
-                a[p][k] = c * pk - s * qk;
-                a[q][k] = s * pk + c * qk;
-                let (vp, vq) = (v[p][k], v[q][k]);
-                v[p][k] = c * vp - s * vq;
-                v[q][k] = s * vp + c * vq;
-            }
-        }
+    let mut values = matrix;
+    let mut vectors = DMat3::IDENTITY;
+    for (p, q) in [(0, 1), (0, 2), (1, 2)].repeat(12) {
+        let turn = rotation(values, p, q);
+        values = turn.transpose() * values * turn;
+        vectors *= turn;
     }
-    let least = (0..3)
-        .min_by(|&i, &j| a[i][i].total_cmp(&a[j][j]))
-        .unwrap_or(0);
-    DVec3::from_array(v[least]).normalize_or(DVec3::Z)
+    let least = (0..3).min_by(|&i, &j| values.col(i)[i].total_cmp(&values.col(j)[j]));
+    vectors.col(least.unwrap_or(0)).normalize_or(DVec3::Z)
+}
+
+/// The rotation in the plane of axes p and q that makes their mixed entry zero.
+fn rotation(a: DMat3, p: usize, q: usize) -> DMat3 {
+    let mut turn = DMat3::IDENTITY;
+    let mixed = a.col(q)[p];
+    if mixed != 0.0 {
+        let theta = (a.col(q)[q] - a.col(p)[p]) / (2.0 * mixed);
+        let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
+        let c = t.hypot(1.0).recip();
+        turn.col_mut(p)[p] = c;
+        turn.col_mut(p)[q] = -t * c;
+        turn.col_mut(q)[p] = t * c;
+        turn.col_mut(q)[q] = c;
+    }
+    turn
 }
 
 #[cfg(test)]

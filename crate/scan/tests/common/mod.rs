@@ -1,5 +1,5 @@
 //! Small scans made in memory.
-#![allow(dead_code)] // each test file uses its own part
+#![allow(dead_code, clippy::unwrap_used)] // each test file uses its own part
 
 pub mod room;
 pub mod zip;
@@ -113,18 +113,17 @@ impl Files {
             "camera-intrinsics.txt".to_owned(),
             INTRINSICS.as_bytes().to_vec(),
         )]);
+        let color = jpeg(WIDTH, HEIGHT, &texture(WIDTH, HEIGHT));
+        let depth = flat_depth(WIDTH, HEIGHT, 2000);
         for index in 0..count {
             let stem = format!("frame-{index:06}");
             let pose = DAffine3::from_translation(glam::DVec3::X * 0.2 * index as f64);
-            files.set(
-                &format!("{stem}.color.jpg"),
-                jpeg(WIDTH, HEIGHT, &texture(WIDTH, HEIGHT)),
-            );
-            files.set(
-                &format!("{stem}.depth.png"),
-                flat_depth(WIDTH, HEIGHT, 2000),
-            );
-            files.set(&format!("{stem}.pose.txt"), pose_text(&pose));
+            let pose = pose_text(&pose).into_bytes();
+            files.0.extend([
+                (format!("{stem}.color.jpg"), color.clone()),
+                (format!("{stem}.depth.png"), depth.clone()),
+                (format!("{stem}.pose.txt"), pose),
+            ]);
         }
         files
     }
