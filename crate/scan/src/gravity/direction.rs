@@ -30,7 +30,8 @@ const NOISE_M: f64 = 0.005;
 /// Lean of a patch on a perfect wall; generous, because all patches of a wall share the errors of their poses.
 const NORMAL_NOISE_RAD: f64 = 0.03;
 
-/// Refines the cameras' `guess`; `right` are the cameras' x axes. `None` when neither enough level surface nor walls facing two ways are seen.
+/// Refines the cameras' `guess`; `right` are the cameras' x axes. `None` when neither enough level surface nor
+/// walls facing two ways are seen.
 pub(super) fn refine(guess: DVec3, right: &[DVec3], patches: &[Patch]) -> Option<DVec3> {
     let sample = |list: usize, wanted: usize| list.div_ceil(wanted).max(1);
     let few: Vec<DVec3> = patches
@@ -44,11 +45,9 @@ pub(super) fn refine(guess: DVec3, right: &[DVec3], patches: &[Patch]) -> Option
         .copied()
         .collect();
     let best = cone(guess)
-        .max_by(|a, b| {
-            let score = |up: &DVec3| score(*up, guess, &some_right, &few);
-            score(a).total_cmp(&score(b))
-        })
-        .unwrap_or(guess);
+        .map(|up| (score(up, guess, &some_right, &few), up))
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or(guess, |(_, up)| up);
     let up = by_normals(best, patches);
     by_planes(up, patches)
 }

@@ -175,6 +175,17 @@ pub fn finding<'s>(scan: &'s Scan, code: &str) -> &'s scan::Finding {
     }
 }
 
+/// Opens a scan that must be refused, and gives the text.
+pub fn refused(files: Files) -> (ScanError, String) {
+    match files.open() {
+        Ok(scan) => panic!("opened with {} frames", scan.frames().len()),
+        Err(error) => {
+            let text = error.to_string();
+            (error, text)
+        }
+    }
+}
+
 /// Every part of a text that a user needs.
 pub fn assert_tells(text: &str, parts: &[&str]) {
     for part in parts {
