@@ -66,7 +66,7 @@ fn assert_floor_is_flat_at_the_bottom(scan: &Scan, least_share: f64) {
     );
 }
 
-/// `up` is the floor's normal in the ground truth mesh, by RANSAC and least squares in NumPy.
+/// `up` is the floor's normal in the ground truth mesh, by RANSAC and least squares: tests/data/floor_normal.py.
 fn assert_up(scan: &Scan, up: [f64; 3]) {
     let error_deg = scan
         .gravity()
