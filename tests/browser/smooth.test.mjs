@@ -1,0 +1,74 @@
+// The main thread belongs to the visitor: no task over 50 ms while a room is made, and the view answers the pointer all along.
+import assert from 'node:assert/strict';
+import { mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { visit } from './launch.mjs';
+import { put, scan } from './scene.mjs';
+
+let browser;
+const folder = mkdtempSync(join(tmpdir(), 'ipdrecon-'));
+before(async () => {
+  browser = await visit();
+});
+after(async () => {
+  rmSync(folder, { recursive: true });
+  await browser.close();
+});
+
+const noLongTask = async (visitor, what) => assert.deepEqual(await visitor.longTasks(), [], `long tasks during ${what}`);
+
+test('no long task from the click on the sample to the exported file', async () => {
+  const visitor = await browser.open();
+  await visitor.until('idle');
+  await visitor.forget();
+  await visitor.page.click('#sample');
+  await visitor.until('finished');
+  await visitor.download('[data-format=glb]');
+  await noLongTask(visitor, 'the sample');
+  await visitor.close();
+});
+
+test('the view can be turned while the mesh is still growing', async () => {
+  const visitor = await browser.open({ path: '?sample' });
+  const { page } = visitor;
+  await visitor.event('bricks');
+  await page.click('#pause');
+  await visitor.until('paused');
+  await page.waitForTimeout(800);
+  const still = await visitor.picture();
+  await page.waitForTimeout(300);
+  assert.equal((await visitor.picture()).hash, still.hash, 'a held view stands still');
+  // Taking pictures is work of the test's own on the page's thread.
+  await visitor.forget();
+  await page.click('#pause');
+  await visitor.until('running');
+  const { x, y, width, height } = await page.locator('ipd-recon').boundingBox();
+  await page.mouse.move(x + width / 2, y + height / 2);
+  await page.mouse.down();
+  await page.mouse.move(x + width / 2 + 180, y + height / 2 + 30, { steps: 12 });
+  await page.mouse.up();
+  const turned = await visitor.event('cameraChanged');
+  assert.equal((await visitor.events('finished')).length, 0, 'the view has moved and come to rest before the run was over');
+  assert.ok(turned.description.length > 10);
+  await visitor.until('finished');
+  await noLongTask(visitor, 'turning');
+  await visitor.close();
+});
+
+test('a folder of 6,000 files is read without a long task', async () => {
+  const files = scan(12);
+  for (let index = 0; index < 6000; index += 1) files[`other/${String(index % 7)}/note-${index}.txt`] = 'no frame';
+  files['.hidden/thing.txt'] = files['other/.DS_Store'] = 'left out';
+  const many = put(join(folder, 'many'), files);
+  const visitor = await browser.open({ path: '?autostart=0' });
+  await visitor.until('idle');
+  await visitor.forget();
+  await visitor.drop(many);
+  await visitor.until('planned');
+  await noLongTask(visitor, 'the drop');
+  const [opened] = await visitor.events('opened');
+  assert.equal(opened.frames, 12);
+  await visitor.close();
+});

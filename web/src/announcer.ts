@@ -1,0 +1,71 @@
+/** Says what goes on: every change to the eye, and to the ear only as often as one can listen. */
+import type { Event as EngineEvent, StageName } from "./engine.js";
+import { count, counted, stageTitle } from "./words.js";
+
+/** Progress is spoken at each of these shares of the work. */
+const SPOKEN_SHARE = 0.25;
+
+/** Turns events into the caption and into the words of the one `role="status"`. */
+export class Announcer {
+  #stage: StageName = "opening";
+  #spoken = 0;
+
+  constructor(
+    readonly status: HTMLElement,
+    readonly caption: HTMLElement,
+  ) {}
+
+  /** Takes one event of the engine. */
+  take(event: EngineEvent): void {
+    switch (event.type) {
+      case "opened":
+        this.#both(`Opened ${event.name}: ${event.format}, ${counted(event.frames, "frame")}.`);
+        break;
+      case "planned":
+        this.#both(`Planned: ${count(event.plan.keyframes)} of ${counted(event.plan.frames, "frame")} kept.`);
+        break;
+      case "stage":
+        this.#stage = event.stage;
+        this.#spoken = 0;
+        this.#both(`${stageTitle(event.stage)}…`);
+        break;
+      case "progress":
+        this.#progress(event.done, event.total, event.triangles);
+        break;
+      case "paused":
+        this.#both("Paused.");
+        break;
+      case "resumed":
+        this.#both("Going on.");
+        break;
+      case "finished": {
+        const how = event.cancelled ? "Stopped" : "Finished";
+        this.#both(`${how}: ${counted(event.triangles, "triangle")} from ${counted(event.frames, "frame")}.`);
+        break;
+      }
+      case "failed":
+        this.#both(`${event.message} ${event.advice}`);
+        break;
+      case "exported":
+        this.status.textContent = `${event.fileName} is ready.`;
+        break;
+      case "cameraChanged":
+        this.status.textContent = event.description;
+        break;
+    }
+  }
+
+  #progress(done: number, total: number, triangles: number): void {
+    const words = total > 0 ? `${stageTitle(this.#stage)}: ${count(done)} of ${count(total)}` : stageTitle(this.#stage);
+    this.caption.textContent = `${words}, ${counted(triangles, "triangle")}.`;
+    const share = total > 0 ? Math.floor(done / total / SPOKEN_SHARE) : 0;
+    if (share <= this.#spoken) return;
+    this.#spoken = share;
+    this.status.textContent = this.caption.textContent;
+  }
+
+  #both(words: string): void {
+    this.status.textContent = words;
+    this.caption.textContent = words;
+  }
+}

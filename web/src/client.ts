@@ -1,0 +1,364 @@
+/**
+ * The engine as an object: for people who bring their own page. Spawns the worker, turns its events into typed DOM events and
+ * its answers into promises. Knows nothing of elements, layout or pointers.
+ */
+import { collect, DropError, type Droppable, type Dropped } from "./drop.js";
+import type {
+  DeviceChoice,
+  Event as EngineEvent,
+  FindingMessage,
+  InputEvent,
+  LookAt,
+  MeshFormat,
+  PlanSummary,
+  Request,
+  RunOptions,
+  ViewOptions,
+} from "./engine.js";
+import type { FromWorker, ToWorker } from "./worker.js";
+
+/** One of the engine's events by its name. */
+export type EventOf<K extends EngineEvent["type"]> = Extract<EngineEvent, { type: K }>;
+
+/** Where a reconstruction stands. */
+export type State = "starting" | "idle" | "opening" | "planned" | "running" | "paused" | "finished" | "failed";
+
+/** Every DOM event of a {@link Reconstructor}; `detail` is the engine's event. */
+export type ReconstructorEventMap = { [K in EngineEvent["type"]]: CustomEvent<EventOf<K>> } & {
+  state: CustomEvent<State>;
+};
+
+/** How to start. */
+export interface ReconstructorOptions {
+  /** Where to draw; left out, nothing is drawn. Its control is transferred, which cannot be undone. */
+  canvas?: HTMLCanvasElement | OffscreenCanvas;
+  /** Size of the canvas in physical pixels. */
+  widthPx?: number;
+  heightPx?: number;
+  /** Physical pixels per CSS pixel. */
+  pixelRatio?: number;
+  /** `auto` takes WebGPU if it is there. */
+  device?: DeviceChoice;
+  /** Another place for the worker script, for hosts that move files. It must be of the page's own origin. */
+  workerUrl?: string | URL;
+}
+
+/** Work could not go on. */
+export class ReconstructionError extends Error {
+  override readonly name = "ReconstructionError";
+  constructor(
+    /** `noWebgpu`, `scan`, `memory`, `device`, `internal`, `export` or `disposed`. */
+    readonly code: string,
+    message: string,
+    /** What to try. */
+    readonly advice: string,
+    /** What is wrong with the scan, file by file, if that is why. */
+    readonly findings: readonly FindingMessage[] = [],
+  ) {
+    super(message);
+  }
+}
+
+export interface Reconstructor {
+  addEventListener<K extends keyof ReconstructorEventMap>(
+    type: K,
+    listener: (event: ReconstructorEventMap[K]) => void,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+  addEventListener(
+    type: string,
+    listener: EventListenerOrEventListenerObject | null,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+}
+
+/** One engine in one worker: opens a scan, runs it, exports its mesh. */
+export class Reconstructor extends EventTarget {
+  /** Settles when the engine is up, or could not be started. */
+  readonly ready: Promise<EventOf<"ready">>;
+  readonly #worker: Worker;
+  readonly #ready = new Deferred<EventOf<"ready">>();
+  readonly #exports = new Map<number, Deferred<File>>();
+  #plan?: Deferred<PlanSummary>;
+  #run?: Deferred<EventOf<"finished">>;
+  #lastPlan?: PlanSummary;
+  #findings: FindingMessage[] = [];
+  #state: State = "starting";
+  #alive = true;
+  #lastId = 0;
+
+  constructor({ canvas, widthPx = 1, heightPx = 1, pixelRatio = 1, device = "auto", workerUrl }: ReconstructorOptions = {}) {
+    super();
+    this.ready = this.#ready.promise;
+    if (workerUrl !== undefined) {
+      this.#worker = new Worker(workerUrl, { type: "module" });
+    } else {
+      // Bundlers find the worker by this literal; keep it as it is.
+      this.#worker = new Worker(new URL("./worker.js", import.meta.url), { type: "module" });
+    }
+    this.#worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.#receive(data);
+    this.#worker.onerror = (event) => {
+      event.preventDefault();
+      this.#fail("internal", `The worker script could not be run${event.message ? ` (${event.message})` : ""}.`, "Check the connection and reload the page.");
+    };
+    const offscreen = canvas && "transferControlToOffscreen" in canvas ? canvas.transferControlToOffscreen() : canvas;
+    const request: Request = { type: "start", widthPx, heightPx, pixelRatio, device };
+    this.#send({ request, canvas: offscreen }, offscreen ? [offscreen] : []);
+  }
+
+  /** Where it stands. */
+  get state(): State {
+    return this.#state;
+  }
+
+  /** Whether the engine can still take requests; if not, make a new `Reconstructor`. */
+  get alive(): boolean {
+    return this.#alive;
+  }
+
+  /** What is known to be wrong with the scan that was opened last. */
+  get findings(): readonly FindingMessage[] {
+    return this.#findings;
+  }
+
+  /** The plan that {@link run} would run. */
+  get plan(): PlanSummary | undefined {
+    return this.#lastPlan;
+  }
+
+  /**
+   * Opens a dropped or picked folder or .zip and plans its reconstruction. Call it in the `drop` handler itself: the browser
+   * takes the dropped things back afterwards.
+   */
+  open(input: Droppable): Promise<PlanSummary> {
+    return this.#openWith(collect(input));
+  }
+
+  /** Opens the sample room that is made by rule. */
+  openSample(seed = 1): Promise<PlanSummary> {
+    return this.#openWith(undefined, seed);
+  }
+
+  /** Plans again with other options, without starting. What is left out stays as it was. */
+  replan(options: Partial<RunOptions>): Promise<PlanSummary> {
+    const known = this.#lastPlan;
+    if (!known) return Promise.reject(nothingOpen());
+    const plan = (this.#plan ??= new Deferred());
+    this.request({ type: "replan", options: { ...known.options, ...options } });
+    return plan.promise;
+  }
+
+  /** Runs the plan, or another with these options, to its end. */
+  run(options: Partial<RunOptions> = {}): Promise<EventOf<"finished">> {
+    const known = this.#lastPlan;
+    if (!known) return Promise.reject(nothingOpen());
+    this.#run ??= new Deferred();
+    this.request({ type: "run", options: { ...known.options, ...options } });
+    this.#enter("running");
+    return this.#run.promise;
+  }
+
+  /** Holds after the current frame. */
+  pause(): void {
+    this.request({ type: "pause" });
+  }
+
+  /** Goes on. */
+  resume(): void {
+    this.request({ type: "resume" });
+  }
+
+  /** Stops. What was fused so far can be looked at and exported. */
+  cancel(): void {
+    this.request({ type: "cancel" });
+  }
+
+  /** The mesh as a file, in the scan's own frame unless `canonical` (metres, Z up) is asked for. */
+  exportMesh(format: MeshFormat, { canonical = false } = {}): Promise<File> {
+    return this.#ask((id) => ({ type: "export", id, format, canonical }));
+  }
+
+  /** The view as a PNG. */
+  screenshot(): Promise<File> {
+    return this.#ask((id) => ({ type: "screenshot", id }));
+  }
+
+  /** How the view is drawn. */
+  view(view: ViewOptions): void {
+    this.request({ type: "view", view });
+  }
+
+  /** Puts the camera somewhere. */
+  look(at: LookAt): void {
+    this.request({ type: "look", at });
+  }
+
+  /** Pointer, wheel, keys and size of the canvas. */
+  input(input: InputEvent): void {
+    this.request({ type: "input", input });
+  }
+
+  /** Any request of the protocol. */
+  request(request: Request): void {
+    this.#send({ request });
+  }
+
+  /** Ends the worker and frees everything it holds. Promises that are still open are rejected. */
+  dispose(): void {
+    this.#alive = false;
+    this.#worker.terminate();
+    this.#rejectAll(new ReconstructionError("disposed", "The reconstruction was closed.", "Open the scan again."));
+  }
+
+  async #openWith(gathering?: Promise<Dropped>, seed = 0): Promise<PlanSummary> {
+    const plan = (this.#plan = new Deferred());
+    this.#lastPlan = undefined;
+    this.#findings = [];
+    this.#enter("opening");
+    if (!gathering) {
+      this.request({ type: "openSample", seed });
+      return plan.promise;
+    }
+    try {
+      const dropped = await gathering;
+      if (dropped.kind === "zip") {
+        this.#send({ request: { type: "openZip" }, files: [dropped.file] });
+      } else {
+        this.#send({ request: { type: "openFolder", paths: dropped.paths }, files: dropped.files });
+        this.#report(dropped.unreadable);
+      }
+    } catch (cause) {
+      if (cause instanceof DropError) this.#report(cause.unreadable);
+      const message = cause instanceof Error ? cause.message : String(cause);
+      this.#fail("scan", message, cause instanceof DropError ? cause.advice : "Drop the folder again, or a .zip of it.");
+    }
+    return plan.promise;
+  }
+
+  /** What could not be read is a finding like those of the engine. */
+  #report(unreadable: Extract<Dropped, { kind: "folder" }>["unreadable"]): void {
+    for (const { path, reason } of unreadable) {
+      this.#happen({
+        type: "finding",
+        finding: {
+          severity: "warning",
+          code: "unreadable",
+          file: path,
+          line: undefined,
+          expected: "a file that the browser may read",
+          found: reason,
+          advice: "Check that it still exists and may be read, then drop the folder again.",
+        },
+      });
+    }
+  }
+
+  #ask(make: (id: number) => Request): Promise<File> {
+    const answer = new Deferred<File>();
+    const id = ++this.#lastId;
+    this.#exports.set(id, answer);
+    this.request(make(id));
+    return answer.promise;
+  }
+
+  #send(message: ToWorker, transfer: Transferable[] = []): void {
+    if (this.#alive) this.#worker.postMessage(message, transfer);
+  }
+
+  #receive({ event, payload }: FromWorker): void {
+    if (event.type === "exported") {
+      const answer = this.#exports.get(event.id);
+      this.#exports.delete(event.id);
+      answer?.resolve(new File(payload ? [payload] : [], event.fileName, { type: event.mime }));
+    }
+    this.#happen(event);
+  }
+
+  #fail(code: string, message: string, advice: string): void {
+    this.#happen({ type: "failed", code, message, advice });
+  }
+
+  /** Takes an event into the state, tells the listeners, then settles promises: whoever awaits one sees the new state. */
+  #happen(event: EngineEvent): void {
+    switch (event.type) {
+      case "ready":
+        if (this.#state === "starting") this.#enter("idle");
+        break;
+      case "planned":
+        this.#lastPlan = event.plan;
+        if (this.#state !== "running" && this.#state !== "paused") this.#enter("planned");
+        break;
+      case "paused":
+        this.#enter("paused");
+        break;
+      case "resumed":
+        this.#enter("running");
+        break;
+      case "finished":
+        this.#enter("finished");
+        break;
+      case "finding":
+        this.#findings.push(event.finding);
+        break;
+      case "failed":
+        if (event.code !== "scan" && event.code !== "export") this.#alive = false;
+        if (event.code !== "export") this.#enter("failed");
+        break;
+    }
+    this.dispatchEvent(new CustomEvent(event.type, { detail: event }));
+    this.#settle(event);
+  }
+
+  #settle(event: EngineEvent): void {
+    if (event.type === "ready") {
+      this.#ready.resolve(event);
+    } else if (event.type === "planned") {
+      this.#plan?.resolve(event.plan);
+      this.#plan = undefined;
+    } else if (event.type === "finished") {
+      this.#run?.resolve(event);
+      this.#run = undefined;
+    } else if (event.type === "failed") {
+      const error = new ReconstructionError(event.code, event.message, event.advice, this.#findings);
+      if (event.code === "export") this.#rejectExports(error);
+      else this.#rejectAll(error);
+    }
+  }
+
+  #enter(state: State): void {
+    if (this.#state === state) return;
+    this.#state = state;
+    this.dispatchEvent(new CustomEvent("state", { detail: state }));
+  }
+
+  #rejectAll(error: ReconstructionError): void {
+    this.#ready.reject(error);
+    this.#plan?.reject(error);
+    this.#run?.reject(error);
+    this.#plan = this.#run = undefined;
+    this.#rejectExports(error);
+  }
+
+  #rejectExports(error: ReconstructionError): void {
+    for (const answer of this.#exports.values()) answer.reject(error);
+    this.#exports.clear();
+  }
+}
+
+/** A promise that is settled from outside. Nobody has to listen to it: every failure is also an event. */
+class Deferred<T> {
+  readonly promise: Promise<T>;
+  resolve!: (value: T) => void;
+  reject!: (error: Error) => void;
+  constructor() {
+    this.promise = new Promise((resolve, reject) => {
+      this.resolve = resolve;
+      this.reject = reject;
+    });
+    this.promise.catch(() => undefined);
+  }
+}
+
+function nothingOpen(): ReconstructionError {
+  return new ReconstructionError("scan", "No scan is open.", "Open a folder, a .zip or the sample first.");
+}

@@ -1,0 +1,27 @@
+/** What the engine's events are called in front of people: on the page, in the caption and by the announcer. */
+import type { StageName } from "./engine.js";
+
+const STAGES: Record<StageName, string> = {
+  opening: "Reading the scan",
+  warmingUp: "Warming up",
+  fusing: "Fusing depth",
+  meshing: "Finishing the mesh",
+};
+
+/** The stages in the order in which they come. */
+export const STAGE_ORDER: readonly StageName[] = ["opening", "warmingUp", "fusing", "meshing"];
+
+/** A stage in words. */
+export function stageTitle(stage: StageName): string {
+  return STAGES[stage];
+}
+
+/** A count in the reader's own way of writing numbers. */
+export function count(n: number): string {
+  return n.toLocaleString();
+}
+
+/** A count with its noun: `1 frame`, `2 frames`. */
+export function counted(n: number, noun: string): string {
+  return `${count(n)} ${noun}${n === 1 ? "" : "s"}`;
+}

@@ -1,0 +1,92 @@
+/**
+ * The module worker: loads the engine, hands it messages and hands its events on. It queues what comes before the engine
+ * is up, and it turns a crash of the engine into one sentence for the visitor instead of a page that stands still.
+ */
+import init, { Engine } from "./engine.js";
+import type { Event, Request } from "./engine.js";
+
+/** From the page to the worker: a request, and the binary things that travel beside it. */
+export interface ToWorker {
+  request: Request;
+  /** Beside `start`; without it the engine computes and shows nothing. */
+  canvas?: OffscreenCanvas;
+  /** Beside `openFolder` (one for each path, in the same order) and `openZip`. */
+  files?: File[];
+}
+
+/** From the worker to the page: an event, and the bytes of an exported file beside it. */
+export interface FromWorker {
+  event: Event;
+  payload?: Uint8Array<ArrayBuffer>;
+}
+
+const scope = self as unknown as DedicatedWorkerGlobalScope;
+const waiting: ToWorker[] = [];
+let engine: Engine | undefined;
+let started = false;
+let dead = false;
+
+scope.onmessage = ({ data }: MessageEvent<ToWorker>) => {
+  if (data.request.type === "start" && !started) {
+    started = true;
+    void start(data);
+  } else if (engine) {
+    deliver(engine, data);
+  } else {
+    waiting.push(data);
+  }
+};
+
+// A panic inside one of the engine's own tasks reaches nobody's `catch`: it ends here.
+scope.addEventListener("error", (event) => {
+  event.preventDefault();
+  die(event.error ?? event.message);
+});
+scope.addEventListener("unhandledrejection", (event) => die(event.reason));
+
+async function start({ request, canvas }: ToWorker): Promise<void> {
+  try {
+    await init({ module_or_path: new URL("./engine_bg.wasm", import.meta.url) });
+  } catch (cause) {
+    die(cause, "The engine could not be loaded", "Check the connection and reload the page.");
+    return;
+  }
+  try {
+    const up = await Engine.start(canvas, request, emit);
+    engine = up;
+    for (const message of waiting.splice(0)) deliver(up, message);
+  } catch (cause) {
+    die(cause, "The engine could not be started");
+  }
+}
+
+function deliver(to: Engine, { request, files }: ToWorker): void {
+  if (dead) return;
+  try {
+    to.handle(request, files ?? []);
+  } catch (cause) {
+    die(cause);
+  }
+}
+
+function emit(event: Event, payload?: Uint8Array): void {
+  if (dead) return;
+  // What the engine says about its own end is better than what could be said here about the trap that follows it.
+  dead = event.type === "failed" && (event.code === "internal" || !engine);
+  const bytes = payload as Uint8Array<ArrayBuffer> | undefined;
+  const message: FromWorker = { event, payload: bytes };
+  scope.postMessage(message, bytes ? [bytes.buffer] : []);
+}
+
+function die(
+  cause: unknown,
+  what = "The engine stopped because of an error of its own",
+  advice = "Start again. If it happens once more, a coarser voxel size or fewer frames may get through.",
+): void {
+  emit({ type: "failed", code: "internal", message: `${what} (${reason(cause)}).`, advice });
+}
+
+function reason(cause: unknown): string {
+  const text = cause instanceof Error ? `${cause.name}: ${cause.message}` : String(cause);
+  return text.replace(/[.\s]+$/, "");
+}

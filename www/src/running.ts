@@ -1,0 +1,53 @@
+/** Progress: which stage, how much of it, and the buttons that hold and stop it. */
+import type { IpdReconElement } from "./ipdrecon/index.js";
+import { count, counted, STAGE_ORDER, stageTitle } from "./ipdrecon/index.js";
+import { byId, make, write } from "./dom.js";
+import { seconds } from "./format.js";
+import type { Model } from "./model.js";
+
+const steps = STAGE_ORDER.map((stage) => {
+  const step = make("li");
+  step.title = stageTitle(stage);
+  step.append(make("span", stageTitle(stage), "unseen"));
+  return step;
+});
+
+/** Wires pause and cancel. */
+export function wireRunning(viewer: IpdReconElement): void {
+  byId("stages").replaceChildren(...steps);
+  byId("pause").addEventListener("click", () => (viewer.state === "paused" ? viewer.resume() : viewer.pause()));
+  byId("cancel").addEventListener("click", () => {
+    // While a scan is being read there is nothing yet that could stay.
+    if (viewer.state === "opening") viewer.restart();
+    else viewer.cancel();
+  });
+}
+
+/** Draws progress. */
+export function drawRunning({ state, stage: told, progress, triangles }: Model): void {
+  const opening = state === "opening";
+  byId("running").hidden = !opening && state !== "running" && state !== "paused";
+  const stage = opening ? "opening" : told;
+  const now = stage ? STAGE_ORDER.indexOf(stage) : 0;
+  steps.forEach((step, index) => {
+    step.className = index < now ? "past" : "";
+    if (index === now) step.setAttribute("aria-current", "step");
+    else step.removeAttribute("aria-current");
+  });
+
+  const bar = byId<HTMLProgressElement>("bar");
+  const known = progress !== undefined && progress.total > 0;
+  const words = stage ? stageTitle(stage) : "Starting";
+  write(byId("bar-words"), known ? `${words}, ${count(progress.done)} of ${count(progress.total)}` : `${words}…`);
+  if (known) {
+    bar.max = progress.total;
+    bar.value = progress.done;
+  } else {
+    bar.removeAttribute("value");
+  }
+  write(byId("triangles"), triangles > 0 ? counted(triangles, "triangle") : "");
+  write(byId("elapsed"), progress ? seconds(progress.elapsedS) : "");
+  const pause = byId<HTMLButtonElement>("pause");
+  pause.hidden = opening;
+  write(pause, state === "paused" ? "Go on" : "Pause");
+}
