@@ -1,6 +1,6 @@
 // The lanes of `npm test`, in the order in which a mistake shows soonest. A lane is a list of commands; each says how its tests are counted.
 import { existsSync, readdirSync } from 'node:fs';
-import { join } from 'node:path';
+import { dirname, join } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { buildEnv, gpu, python, wasmEnv } from '../env.mjs';
 import { must, root, run } from '../run.mjs';
@@ -27,9 +27,17 @@ const cargo = (env, ...args) => ({ program: 'cargo', args, env, count: 'check' }
 /** The crates whose kernels are tested under Node: those with wasm-bindgen-test among their dependencies for tests. */
 async function kernelCrates() {
   const metadata = JSON.parse(await must('cargo', ['metadata', '--format-version', '1', '--no-deps', '--locked'], { env: buildEnv() }));
-  return metadata.packages
-    .filter(({ dependencies }) => dependencies.some(({ name, kind }) => name === 'wasm-bindgen-test' && kind === 'dev'))
-    .map(({ manifest_path }) => join(manifest_path, '..'));
+  return metadata.packages.filter(({ dependencies }) => dependencies.some(({ name, kind }) => name === 'wasm-bindgen-test' && kind === 'dev'));
+}
+
+/** One call for all kernels. The worker is named beside them, so that cargo settles on the features of the engine and burn is not compiled again. */
+async function kernels() {
+  const crates = await kernelCrates();
+  if (crates.length === 0) return nothing('no crate has wasm-bindgen-test among its dev-dependencies');
+  const env = { ...gpu(wasmEnv()), NODE_OPTIONS: `--import ${pathToFileURL(at('tools/webgpu-preload.mjs')).href}` };
+  const packages = ['worker', ...crates.map(({ name }) => name)].flatMap((name) => ['-p', name]);
+  const args = ['test', '--node', '--mode', 'no-install', dirname(crates[0].manifest_path), '--profile', 'web', ...packages];
+  return { program: 'wasm-pack', args, env, count: 'cargo' };
 }
 
 async function wasmClippy() {
@@ -45,13 +53,7 @@ export const lanes = {
   clippy: async () => [cargo(buildEnv(), 'clippy', '--locked', '--release', '--workspace', '--all-targets', '--', '-D', 'warnings'), await wasmClippy()],
   native: async () => [{ ...cargo(gpu(buildEnv()), 'test', '--release', '--workspace', '--no-fail-fast', '--', '--show-output'), count: 'cargo' }],
   build: async () => [check(process.execPath, 'tools/build.mjs')],
-  wasm: async () => {
-    const preload = pathToFileURL(at('tools/webgpu-preload.mjs')).href;
-    const env = { ...gpu(wasmEnv()), NODE_OPTIONS: `--import ${preload}` };
-    const crates = await kernelCrates();
-    if (crates.length === 0) return [nothing('no crate has wasm-bindgen-test among its dev-dependencies')];
-    return crates.map((path) => ({ program: 'wasm-pack', args: ['test', '--node', '--mode', 'no-install', path, '--profile', 'web'], env, count: 'cargo' }));
-  },
+  wasm: async () => [await kernels()],
   browser: async () => [nodeTests('tests/browser')],
   reference: async () => [{ program: python, args: ['-m', 'unittest', 'discover', '-v', '-s', 'tests/reference', '-p', 'test_*.py'], env: buildEnv(), count: 'python' }],
   budget: async () => [nodeTests('tests/budget')],
