@@ -161,7 +161,7 @@ async fn refuse(
     let config = VolumeConfig {
         max_depth_m: 100.0,
         color: false,
-        ..VolumeConfig::new(0.04)
+        ..VolumeConfig::uniform(0.04)
     };
     let mut volume = config.init(device)?;
     let frames = scan.frames().len();

@@ -18,7 +18,7 @@ mod view;
 mod volume;
 
 pub use error::VolumeError;
-pub use extract::BrickMeshes;
+pub use extract::{BrickMeshes, SurfaceRule};
 pub use lattice::{BRICK_EDGE, BRICK_VOXELS, Brick};
 pub use view::DepthView;
 pub use volume::{BYTES_PER_BRICK, Volume, VolumeConfig};

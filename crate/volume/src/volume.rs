@@ -4,9 +4,9 @@ use crate::{
     DepthView, VolumeError,
     allocate::bricks_near_surface,
     compute::Form,
-    extract::{BrickMeshes, Extractor, weld::Welder},
+    extract::{BrickMeshes, Extractor, SurfaceRule, weld::Welder},
     field::{COLOR, Field, SAMPLE},
-    integrate::{self, Lengths},
+    integrate::{self, Rule},
     lattice::{BRICK_EDGE, BRICK_VOXELS, Brick, EMPTY_SLOT, Lattice},
 };
 use burn::tensor::Device;
@@ -31,14 +31,34 @@ pub struct VolumeConfig {
     pub max_depth_m: f32,
     /// Keep colours.
     pub color: bool,
+    /// Weigh a measurement at depth `z` by `1 / max(z, 0.5 m)^2` instead of 1: sensors err more with distance
+    /// (Khoshelham and Elberink 2012).
+    pub weigh_by_depth: bool,
+    /// Which cells may have a surface.
+    pub surface: SurfaceRule,
     /// The largest buffer that a kernel may see, in bytes; it bounds the bricks. WebGPU guarantees 128 MiB.
     pub binding_bytes: usize,
 }
 
 impl VolumeConfig {
-    /// The usual choice for a voxel size: truncation at three voxels, depth up to 5 m, colour.
+    /// The usual choice for a voxel size: truncation at three voxels, depth up to 5 m, colour, and no surface that was
+    /// seen only once from beyond 4.7 m or that hangs between an edge and what is seen past it.
     pub fn new(voxel_size_m: f32) -> Self {
         Self {
+            weigh_by_depth: true,
+            surface: SurfaceRule {
+                least_weight: 1.0 / (4.7 * 4.7),
+                largest_jump: 1.7,
+            },
+            ..Self::uniform(voxel_size_m)
+        }
+    }
+
+    /// Every measurement weighs 1 and every observed cell may have a surface, as in the ground truth of VoRTX.
+    pub fn uniform(voxel_size_m: f32) -> Self {
+        Self {
+            weigh_by_depth: false,
+            surface: SurfaceRule::ANY,
             voxel_size_m,
             truncation_m: 3.0 * voxel_size_m,
             max_depth_m: 5.0,
@@ -84,7 +104,7 @@ impl VolumeConfig {
             form,
             lattice: Lattice::default(),
             field: Field::new(self.color, device),
-            extractor: Extractor::new(form),
+            extractor: Extractor::new(form, self.surface),
             changed: HashSet::new(),
         })
     }
@@ -105,7 +125,7 @@ impl Volume {
     /// Runs the plain form of every operation, on whatever device: for checks of the kernels.
     pub fn use_plain_form(&mut self) {
         self.form = Form::Plain;
-        self.extractor = Extractor::new(Form::Plain);
+        self.extractor = Extractor::new(Form::Plain, self.config.surface);
     }
 
     /// What the volume was made with.
@@ -142,13 +162,14 @@ impl Volume {
         } = self.config;
         let bricks = self.config.bricks_of(view);
         self.reserve(&bricks)?;
-        let lengths = Lengths {
+        let rule = Rule {
             voxel_size_m,
             truncation_m,
             max_depth_m,
+            weigh_by_depth: self.config.weigh_by_depth,
         };
         let (form, field) = (self.form, &mut self.field);
-        integrate::integrate(form, field, &self.lattice, &bricks, view, lengths)?;
+        integrate::integrate(form, field, &self.lattice, &bricks, view, rule)?;
         self.mark_changed(&bricks);
         Ok(())
     }

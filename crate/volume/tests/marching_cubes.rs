@@ -21,7 +21,7 @@ async fn surface(device: &Device, size: IVec3, distance: impl Fn(Vec3) -> Option
     // Voxels of 1 m: positions are lattice coordinates.
     let mut volume = VolumeConfig {
         truncation_m: 1e3,
-        ..VolumeConfig::new(1.0)
+        ..VolumeConfig::uniform(1.0)
     }
     .init(device)
     .unwrap();

@@ -2,7 +2,7 @@
 //! the triangles. Between them only the bricks' triangle counts are read back, four bytes a brick.
 
 use super::{
-    BRICK_RECORD, VERTEX,
+    BRICK_RECORD, SurfaceRule, VERTEX,
     table::{CASE_STRIDE, Table},
 };
 use crate::{
@@ -24,6 +24,7 @@ const THREADS: u32 = 256;
 pub(super) async fn extract(
     field: &Field,
     table: &Table,
+    rule: SurfaceRule,
     mut records: Vec<i32>,
     voxel_size_m: f32,
 ) -> Result<(Tensor<2>, Vec<i32>), VolumeError> {
@@ -53,6 +54,8 @@ pub(super) async fn extract(
             counts.into_buffer_arg(),
             codes.clone().into_buffer_arg(),
             cells as u32,
+            rule.least_weight,
+            rule.largest_jump,
         );
         place_kernel::launch_unchecked(
             &client,
@@ -120,12 +123,15 @@ fn voxel_at(records: &[i32], brick: usize, x: i32, y: i32, z: i32) -> usize {
 }
 
 #[cube(launch_unchecked)]
+#[allow(clippy::too_many_arguments)]
 fn classify_kernel(
     samples: &[f32],
     records: &[i32],
     counts: &[i32],
     codes: &mut [i32],
     cells: u32,
+    least_weight: f32,
+    largest_jump: f32,
 ) {
     let thread = ABSOLUTE_POS;
     if thread >= cells as usize {
@@ -137,6 +143,8 @@ fn classify_kernel(
     let z = (thread / 64 % 8) as i32;
     let mut case = 0i32;
     let mut observed = 0i32;
+    let mut highest = f32::new(-1.0);
+    let mut lowest = f32::new(1.0);
     for corner in 0..8 {
         let voxel = voxel_at(
             records,
@@ -145,15 +153,22 @@ fn classify_kernel(
             y + corner / 2 % 2,
             z + corner / 4,
         );
-        if samples[voxel * SAMPLE + 1] > 0.0 {
+        let distance = samples[voxel * SAMPLE];
+        if samples[voxel * SAMPLE + 1] > least_weight {
             observed += 1;
         }
-        if samples[voxel * SAMPLE] < 0.0 {
+        if distance > highest {
+            highest = distance;
+        }
+        if distance < lowest {
+            lowest = distance;
+        }
+        if distance < 0.0 {
             case += 1 << corner;
         }
     }
     let mut code = 0i32;
-    if observed == 8 {
+    if observed == 8 && highest - lowest < largest_jump {
         code = case + counts[case as usize] * 256;
     }
     codes[thread] = code;

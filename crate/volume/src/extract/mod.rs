@@ -1,7 +1,7 @@
 //! Marching cubes over bricks: triangles as the renderer draws them and as exports are welded from.
 //!
-//! A cell of a brick has its lowest corner in the brick; its other corners may lie in the next bricks. A cell with a
-//! corner that was never observed gives no face. The vertex on the edge from lattice point A to B (one step along an axis)
+//! A cell of a brick has its lowest corner in the brick; its other corners may lie in the next bricks. A cell gives
+//! no face where a corner was not observed well enough, or where the field jumps: see [`SurfaceRule`]. The vertex on the edge from lattice point A to B (one step along an axis)
 //! lies at `A + t (B - A)`, `t = S_A / (S_A - S_B)`: computed from A on every side, so that bricks join without cracks.
 
 mod fused;
@@ -26,6 +26,24 @@ pub(crate) const VERTEX: usize = mesh::soup::VERTEX_FLOATS;
 /// 27 bricks around it (x fastest), and one to fill up.
 const BRICK_RECORD: usize = 32;
 
+/// Which cells may have a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceRule {
+    /// Each corner needs more weight than this.
+    pub least_weight: f32,
+    /// The corners may differ by less than this, in truncation distances. A distance field changes by the cell's diagonal
+    /// at most; from -1 to 1 in one cell it jumps between what lies behind an edge and what is seen past it.
+    pub largest_jump: f32,
+}
+
+impl SurfaceRule {
+    /// Every cell whose corners were all observed.
+    pub const ANY: Self = Self {
+        least_weight: 0.0,
+        largest_jump: f32::INFINITY,
+    };
+}
+
 /// The surface of some bricks.
 pub struct BrickMeshes {
     /// `[vertices, 6]`: triangles as a soup, see [`mesh::soup`] for the six numbers. No row where there is no surface.
@@ -37,13 +55,15 @@ pub struct BrickMeshes {
 /// Makes the triangles of bricks.
 pub(crate) struct Extractor {
     form: Form,
+    rule: SurfaceRule,
     table: Table,
 }
 
 impl Extractor {
-    pub fn new(form: Form) -> Self {
+    pub fn new(form: Form, rule: SurfaceRule) -> Self {
         Self {
             form,
+            rule,
             table: Table::new(),
         }
     }
@@ -65,9 +85,10 @@ impl Extractor {
                     .chain([0])
             })
             .collect();
+        let (table, rule) = (&self.table, self.rule);
         let (vertices, triangles) = match self.form {
-            Form::Plain => plain::extract(field, &self.table, &records, voxel_size_m).await?,
-            Form::Fused => fused::extract(field, &self.table, records, voxel_size_m).await?,
+            Form::Plain => plain::extract(field, table, rule, &records, voxel_size_m).await?,
+            Form::Fused => fused::extract(field, table, rule, records, voxel_size_m).await?,
         };
         let mut end = 0;
         let ranges = bricks

@@ -4,7 +4,7 @@
 //! the cells' upper corners, and one on either side for the slopes).
 
 use super::{
-    BRICK_RECORD, VERTEX,
+    BRICK_RECORD, SurfaceRule, VERTEX,
     table::{CASE_STRIDE, MAX_TRIANGLES, Table},
 };
 use crate::{
@@ -28,6 +28,7 @@ const STEPS: [i32; 3] = [1, BLOCK_EDGE, BLOCK_EDGE * BLOCK_EDGE];
 pub(super) async fn extract(
     field: &Field,
     table: &Table,
+    rule: SurfaceRule,
     records: &[i32],
     voxel_size_m: f32,
 ) -> Result<(Tensor<2>, Vec<i32>), VolumeError> {
@@ -35,7 +36,7 @@ pub(super) async fn extract(
     let mut triangles = Vec::new();
     for batch in records.chunks(BRICKS_A_BATCH * BRICK_RECORD) {
         let block = Block::gather(field, batch);
-        let (soup, counts) = block.triangles(table, batch, voxel_size_m).await?;
+        let (soup, counts) = block.triangles(table, rule, batch, voxel_size_m).await?;
         vertices.push(soup);
         triangles.extend(counts);
     }
@@ -84,11 +85,12 @@ impl Block {
     async fn triangles(
         &self,
         table: &Table,
+        rule: SurfaceRule,
         records: &[i32],
         voxel_size_m: f32,
     ) -> Result<(Tensor<2>, Vec<i32>), VolumeError> {
         let bricks = records.len() / BRICK_RECORD;
-        let cases = self.cases(bricks);
+        let cases = self.cases(bricks, rule);
         let counts = cases.clone().map_table(&table.counts, &self.device);
         let per_brick = counts.clone().reshape([bricks, BRICK_VOXELS]).sum_dim(1);
         let per_brick = per_brick.into_data_async().await;
@@ -119,20 +121,25 @@ impl Block {
         Ok((self.vertices(records, cell, edge, voxel_size_m), per_brick))
     }
 
-    /// The case of each cell, `[bricks * 512]`; 0 where a corner was never observed.
-    fn cases(&self, bricks: usize) -> Tensor<1, Int> {
+    /// The case of each cell, `[bricks * 512]`; 0 where the rule allows no surface.
+    fn cases(&self, bricks: usize, rule: SurfaceRule) -> Tensor<1, Int> {
         let cells = cell_points(bricks, &self.device);
         let mut case = Tensor::<1, Int>::zeros([bricks * BRICK_VOXELS], (&self.device, DType::I32));
         let mut observed = case.clone();
+        let mut highest = case.clone().float() - 1.0;
+        let mut lowest = case.clone().float() + 1.0;
         for corner in 0..8 {
             let offset: i32 = (0..3).map(|axis| (corner >> axis & 1) * STEPS[axis]).sum();
             let point = cells.clone() + offset;
             let distance = self.distance.clone().select(0, point.clone());
             let weight = self.weight.clone().select(0, point);
-            case = case + distance.lower_elem(0.0).int().cast(DType::I32) * (1 << corner);
-            observed = observed + weight.greater_elem(0.0).int().cast(DType::I32);
+            case = case + distance.clone().lower_elem(0.0).int().cast(DType::I32) * (1 << corner);
+            observed = observed + weight.greater_elem(rule.least_weight).int().cast(DType::I32);
+            highest = highest.max_pair(distance.clone());
+            lowest = lowest.min_pair(distance);
         }
-        case * observed.equal_elem(8).int().cast(DType::I32)
+        let smooth = (highest - lowest).lower_elem(rule.largest_jump);
+        case * observed.equal_elem(8).bool_and(smooth).int().cast(DType::I32)
     }
 
     /// `[vertices, 6]` on the `edge`s of the `cell`s.

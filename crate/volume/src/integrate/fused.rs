@@ -1,6 +1,6 @@
 //! Integration as one kernel: a thread a voxel.
 
-use super::{BRICK_RECORD, Camera};
+use super::{BRICK_RECORD, Camera, NEAR_M};
 use crate::{
     VolumeError,
     compute::{float_buffer, float_tensor, int_buffer},
@@ -25,6 +25,7 @@ pub(super) fn integrate(
     image: Option<Tensor<1>>,
 ) -> Result<(), VolumeError> {
     let device = field.device().clone();
+    let weigh_by_depth = camera.rule.weigh_by_depth;
     let numbers = camera.numbers();
     let numbers = TensorData::new(numbers.clone(), [numbers.len()]);
     let camera = float_buffer(Tensor::<1>::from_data(numbers, (&device, DType::F32)))?;
@@ -52,6 +53,7 @@ pub(super) fn integrate(
                 image.clone().into_buffer_arg(),
                 voxels as u32,
                 has_color,
+                weigh_by_depth,
             );
         }
     }
@@ -86,6 +88,7 @@ fn integrate_kernel(
     image: &[f32],
     voxels: u32,
     #[comptime] has_color: bool,
+    #[comptime] weigh_by_depth: bool,
 ) {
     let thread = ABSOLUTE_POS;
     if thread >= voxels as usize {
@@ -112,9 +115,14 @@ fn integrate_kernel(
             let sdf = measured - z;
             if measured > 0.0 && measured <= camera[26] && sdf >= -truncation_m {
                 let s = (sdf / truncation_m).min(1.0);
-                let sum = samples[voxel * SAMPLE + 1] + 1.0;
+                let mut weight = 1.0f32;
+                if comptime!(weigh_by_depth) {
+                    let far = z.max(NEAR_M);
+                    weight = 1.0f32 / (far * far);
+                }
+                let sum = samples[voxel * SAMPLE + 1] + weight;
                 let mean = samples[voxel * SAMPLE];
-                samples[voxel * SAMPLE] = mean + (s - mean) / sum;
+                samples[voxel * SAMPLE] = mean + (s - mean) * weight / sum;
                 samples[voxel * SAMPLE + 1] = sum;
                 if comptime!(has_color) && sdf <= truncation_m {
                     let at = pixel(camera, 18usize, x, y, z);
@@ -124,10 +132,10 @@ fn integrate_kernel(
                         let green = ((packed - red * 65536.0) / 256.0).floor();
                         let blue = packed - red * 65536.0 - green * 256.0;
                         let to = voxel * COLOR;
-                        let sum = colors[to + 3] + 1.0;
-                        colors[to] = colors[to] + (red - colors[to]) / sum;
-                        colors[to + 1] = colors[to + 1] + (green - colors[to + 1]) / sum;
-                        colors[to + 2] = colors[to + 2] + (blue - colors[to + 2]) / sum;
+                        let sum = colors[to + 3] + weight;
+                        colors[to] = colors[to] + (red - colors[to]) * weight / sum;
+                        colors[to + 1] = colors[to + 1] + (green - colors[to + 1]) * weight / sum;
+                        colors[to + 2] = colors[to + 2] + (blue - colors[to + 2]) * weight / sum;
                         colors[to + 3] = sum;
                     }
                 }

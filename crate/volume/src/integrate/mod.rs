@@ -3,7 +3,8 @@
 //!
 //! For lattice point `p` with camera coordinates `(x, y, z)`, pixel `(u, v)` nearest to its projection and depth
 //! `d = D(u, v)`: `sdf = d - z`. Skipped where `p` is outside the image, nothing was measured, `d` is beyond the maximum
-//! depth or `sdf < -truncation`. Otherwise with `s = min(1, sdf / truncation)` and weight `w = 1`:
+//! depth or `sdf < -truncation`. Otherwise with `s = min(1, sdf / truncation)` and weight `w`, 1 or
+//! `1 / max(z, 0.5 m)^2`:
 //! `S <- (S W + s w) / (W + w)`, `W <- W + w`; colour likewise, with a weight of its own, where `|sdf| <= truncation`.
 
 mod fused;
@@ -25,12 +26,17 @@ use mesh::camera::Pinhole;
 /// Integers that describe one brick to the kernels: slot, then x, y, z of the brick.
 const BRICK_RECORD: usize = 4;
 
-/// Lengths that integration goes by.
+/// Nearer than this a measurement weighs no more.
+const NEAR_M: f32 = 0.5;
+
+/// What integration goes by.
 #[derive(Clone, Copy)]
-pub(crate) struct Lengths {
+pub(crate) struct Rule {
     pub voxel_size_m: f32,
     pub truncation_m: f32,
     pub max_depth_m: f32,
+    /// Weight `1 / max(z, 0.5 m)^2` instead of 1.
+    pub weigh_by_depth: bool,
 }
 
 /// The numbers of one image, in the order in which both forms read them.
@@ -38,7 +44,7 @@ struct Camera {
     camera_from_world: Affine3A,
     depth: Pinhole,
     color: Option<Pinhole>,
-    lengths: Lengths,
+    rule: Rule,
 }
 
 impl Camera {
@@ -51,11 +57,12 @@ impl Camera {
             let (width, height) = (camera.width as f32, camera.height as f32);
             numbers.extend([camera.fx, camera.fy, camera.cx, camera.cy, width, height]);
         }
-        let Lengths {
+        let Rule {
             voxel_size_m,
             truncation_m,
             max_depth_m,
-        } = self.lengths;
+            ..
+        } = self.rule;
         numbers.extend([voxel_size_m, truncation_m, max_depth_m]);
         numbers
     }
@@ -68,7 +75,7 @@ pub(crate) fn integrate(
     lattice: &Lattice,
     bricks: &[Brick],
     view: &DepthView<'_>,
-    lengths: Lengths,
+    rule: Rule,
 ) -> Result<(), VolumeError> {
     if bricks.is_empty() {
         return Ok(());
@@ -79,7 +86,7 @@ pub(crate) fn integrate(
         camera_from_world: view.world_from_camera.inverse(),
         depth: view.depth_camera,
         color: with_color.map(|(_, camera)| camera),
-        lengths,
+        rule,
     };
     let depth = TensorData::new(view.depth_m.to_vec(), [view.depth_m.len()]);
     let depth = Tensor::<1>::from_data(depth, (&device, DType::F32));

@@ -1,6 +1,6 @@
 //! Integration in tensor operations: the definition that the kernel is checked against, and what CPU devices run.
 
-use super::{BRICK_RECORD, Camera};
+use super::{BRICK_RECORD, Camera, NEAR_M};
 use crate::{
     field::{COLOR, Field, SAMPLE},
     lattice::BRICK_VOXELS,
@@ -42,34 +42,41 @@ fn integrate_batch(
     );
     let [x, y, z] = camera_points(records, camera, &device);
 
-    let lengths = camera.lengths;
+    let rule = camera.rule;
     let (at, inside) = pixels(&camera.depth, &x, &y, &z);
     let measured = depth.clone().gather(0, at);
     let sdf = measured.clone() - z.clone();
     let seen = inside
         .bool_and(measured.clone().greater_elem(0.0))
-        .bool_and(measured.lower_equal_elem(lengths.max_depth_m))
-        .bool_and(sdf.clone().greater_equal_elem(-lengths.truncation_m));
-    let s = (sdf.clone() / lengths.truncation_m).clamp_max(1.0);
-    average(&mut field.samples, &slots, SAMPLE, &seen, &[s]);
+        .bool_and(measured.lower_equal_elem(rule.max_depth_m))
+        .bool_and(sdf.clone().greater_equal_elem(-rule.truncation_m));
+    let s = (sdf.clone() / rule.truncation_m).clamp_max(1.0);
+    let weight = if rule.weigh_by_depth {
+        z.clone().clamp_min(NEAR_M).powi_scalar(-2)
+    } else {
+        z.ones_like()
+    };
+    let step = weight.clone() * seen.clone().float();
+    average(&mut field.samples, &slots, SAMPLE, step, &[s]);
 
     if let (Some(image), Some(color_camera)) = (image, camera.color) {
         let (at, inside) = pixels(&color_camera, &x, &y, &z);
         let near = seen
             .bool_and(inside)
-            .bool_and(sdf.lower_equal_elem(lengths.truncation_m));
+            .bool_and(sdf.lower_equal_elem(rule.truncation_m));
         let packed = image.clone().gather(0, at);
         let red = (packed.clone() / 65536.0).floor();
         let rest = packed - red.clone() * 65536.0;
         let green = (rest.clone() / 256.0).floor();
         let blue = rest - green.clone() * 256.0;
-        average(&mut field.colors, &slots, COLOR, &near, &[red, green, blue]);
+        let step = weight * near.float();
+        average(&mut field.colors, &slots, COLOR, step, &[red, green, blue]);
     }
 }
 
 /// Camera coordinates of the voxels of each brick, `[bricks * 512]` each.
 fn camera_points(records: &[i32], camera: &Camera, device: &Device) -> [Tensor<1>; 3] {
-    let size = camera.lengths.voxel_size_m;
+    let size = camera.rule.voxel_size_m;
     let voxels = records.len() / BRICK_RECORD * BRICK_VOXELS;
     let mut world: [Vec<f32>; 3] = std::array::from_fn(|_| Vec::with_capacity(voxels));
     for record in records.chunks_exact(BRICK_RECORD) {
@@ -112,29 +119,28 @@ fn pixels(
     (index, inside)
 }
 
-/// One step of the running average at the rows `slots` of `stored`, whose last channel is the weight.
+/// One step of the running average at the rows `slots` of `stored`, whose last channel is the sum of weights. `step` is the
+/// weight of the new values, 0 where there are none.
 fn average(
     stored: &mut Tensor<2>,
     slots: &Tensor<1, Int>,
     channels: usize,
-    seen: &Tensor<1, Bool>,
+    step: Tensor<1>,
     values: &[Tensor<1>],
 ) {
     let bricks = slots.dims()[0];
     let device = stored.device();
     let old = stored.clone().select(0, slots.clone());
     let old = old.reshape([bricks * BRICK_VOXELS, channels]);
-    let seen = seen.clone().float();
     let weight = old.clone().narrow(1, channels - 1, 1).squeeze_dim::<1>(1);
-    let sum = weight.clone() + seen.clone();
-    // Where nothing was seen the step is 0 / max(W, 1).
-    let share = seen.clone() / sum.clone().clamp_min(1.0);
+    // Where nothing was ever seen the share is 0 / tiny.
+    let share = step.clone() / (weight + step.clone()).clamp_min(f32::MIN_POSITIVE);
     let mut changes: Vec<Tensor<2>> = Vec::with_capacity(channels);
     for (channel, value) in values.iter().enumerate() {
         let old = old.clone().narrow(1, channel, 1).squeeze_dim::<1>(1);
         changes.push(((value.clone() - old) * share.clone()).unsqueeze_dim(1));
     }
-    changes.push(seen.unsqueeze_dim(1));
+    changes.push(step.unsqueeze_dim(1));
     let changes = Tensor::cat(changes, 1).reshape([bricks, BRICK_VOXELS * channels]);
     let whole = std::mem::replace(stored, Tensor::empty([1, 1], &device));
     *stored = whole.select_assign(0, slots.clone(), changes, IndexingUpdateOp::Add);

@@ -1,0 +1,56 @@
+//! Everything that ends a command early, in the words of the room it comes from.
+
+use std::path::PathBuf;
+
+/// Why a command ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// A file that cannot be read or written.
+    #[error("expected to {action} {}: {error}; check the path and its permissions", path.display())]
+    File {
+        /// Read or write.
+        action: &'static str,
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        error: std::io::Error,
+    },
+    /// An output whose ending names no format.
+    #[error("expected an output that ends in .ply, .glb or .obj, found {}; rename it", path.display())]
+    Format {
+        /// Which file.
+        path: PathBuf,
+    },
+    /// No GPU, though one was asked for.
+    #[error("expected a GPU that burn can use, found none ({0}); run with --device cpu")]
+    Gpu(String),
+    /// The scan cannot be opened.
+    #[error(transparent)]
+    Scan(#[from] scan::ScanError),
+    /// The folder or zip cannot be opened.
+    #[error(transparent)]
+    Source(#[from] scan::SourceError),
+    /// The run cannot be planned.
+    #[error(transparent)]
+    Plan(#[from] recon::PlanError),
+    /// The run failed.
+    #[error(transparent)]
+    Run(#[from] recon::RunError),
+    /// The volume failed.
+    #[error(transparent)]
+    Volume(#[from] volume::VolumeError),
+    /// The comparison failed.
+    #[error(transparent)]
+    Evaluate(#[from] recon::evaluate::EvaluateError),
+    /// A mesh file that is no PLY.
+    #[error("{}: {error}", path.display())]
+    Ply {
+        /// Which file.
+        path: PathBuf,
+        /// What is wrong with it.
+        error: mesh::ply::PlyError,
+    },
+    /// The result cannot be put into words for programs.
+    #[error("the report could not be written as JSON: {0}")]
+    Json(#[from] serde_json::Error),
+}
