@@ -92,7 +92,11 @@ impl Builder {
             shape,
             center: place.origin,
             axes: place.axes,
-            look: if look.seed == 0 { look.seed(seed) } else { look },
+            look: if look.seed == 0 {
+                look.seed(seed)
+            } else {
+                look
+            },
             casts_shadow: true,
         });
     }
@@ -100,7 +104,14 @@ impl Builder {
     /// A box of outer `size` around the place's origin with edges rounded by `round`.
     pub fn block(&mut self, place: &Place, size: [f32; 3], round: f32, look: Look) {
         let half_m = (Vec3::from(size) * 0.5 - round).max(Vec3::ZERO);
-        self.add(place, Shape::Block { half_m, round_m: round }, look);
+        self.add(
+            place,
+            Shape::Block {
+                half_m,
+                round_m: round,
+            },
+            look,
+        );
     }
 
     /// A cut cone of outer radii and `height` around the place's origin with edges rounded by `round`.
@@ -126,10 +137,19 @@ impl Builder {
     }
 
     /// A cut cone from one point to another of the place.
-    pub fn rod(&mut self, place: &Place, from: [f32; 3], to: [f32; 3], radii: [f32; 2], look: Look) {
+    pub fn rod(
+        &mut self,
+        place: &Place,
+        from: [f32; 3],
+        to: [f32; 3],
+        radii: [f32; 2],
+        look: Look,
+    ) {
         let (a, b) = (place.point(from), place.point(to));
         let z = (b - a).normalize_or(Vec3::Z);
-        let x = if z.z.abs() < 0.9 { Vec3::Z } else { Vec3::X }.cross(z).normalize();
+        let x = if z.z.abs() < 0.9 { Vec3::Z } else { Vec3::X }
+            .cross(z)
+            .normalize();
         let along = Place {
             origin: 0.5 * (a + b),
             axes: Mat3::from_cols(x, z.cross(x), z),

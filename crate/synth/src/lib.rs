@@ -5,18 +5,23 @@
 
 mod builder;
 mod bvh;
-mod camera;
 mod furniture;
+mod layout;
 mod palette;
+mod path;
 mod random;
 mod room;
+mod sample;
 mod seating;
 mod shell;
 mod solid;
+mod surface;
 mod texture;
 mod things;
 mod trace;
 
-pub use camera::Camera;
+pub use layout::Layout;
+pub use path::{CLEARANCE_M, View, path};
 pub use room::Room;
-pub use trace::{Frame, render};
+pub use sample::SampleScan;
+pub use trace::{Frame, depth, render};

@@ -62,7 +62,11 @@ impl Room {
         Self {
             solids: b.solids,
             bvh,
-            size_m: if quarter % 2 == 0 { size } else { Vec3::new(size.y, size.x, size.z) },
+            size_m: if quarter % 2 == 0 {
+                size
+            } else {
+                Vec3::new(size.y, size.x, size.z)
+            },
             window,
             lamp,
         }
@@ -120,7 +124,9 @@ fn furnish(b: &mut Builder, room: &Place, size: Vec3) -> (Light, Light) {
     floor_and_ceiling(b, room, size);
     let paint = Look::new(Pattern::Plaster, [b.palette.wall; 3]);
     let [ground, motif] = b.palette.accent_wall;
-    let pattern = b.random.pick(&[Pattern::Plaster, Pattern::Wallpaper, Pattern::Wallpaper]);
+    let pattern = b
+        .random
+        .pick(&[Pattern::Plaster, Pattern::Wallpaper, Pattern::Wallpaper]);
     let accent = Look::new(pattern, [ground, motif, motif]);
     let glass = Opening {
         x: b.random.range(-0.25, 0.25),
@@ -155,7 +161,7 @@ fn furnish(b: &mut Builder, room: &Place, size: Vec3) -> (Light, Light) {
             north.axes.z_axis * 0.42 * glass.height,
         ],
         facing: -north.axes.y_axis,
-        power: Vec3::new(4.6, 4.9, 5.4),
+        power: Vec3::new(5.0, 5.05, 5.1),
     };
     let lamp = Light {
         center: lamp,
@@ -171,14 +177,24 @@ fn south_side(b: &mut Builder, south: &Place, hx: f32) -> Vec3 {
     let shift = b.random.range(-0.15, 0.15);
     let seats = 2 + b.random.below(2);
     let width = if seats == 3 { 2.15 } else { 1.8 };
-    seating::sofa(b, &south.at(shift, -0.03, 0.0), width, seats, b.palette.sofa);
+    seating::sofa(
+        b,
+        &south.at(shift, -0.03, 0.0),
+        width,
+        seats,
+        b.palette.sofa,
+    );
     let side = 0.5 * width + 0.3;
     let lamp = things::lamp(b, &south.at((shift + side).min(hx - 0.3), -0.38, 0.0), 1.5);
     furniture::side_table(b, &south.at(shift - side, -0.4, 0.0), 0.52);
     let gallery: &[(f32, f32, f32, f32)] = match b.random.below(3) {
         0 => &[(0.0, 1.62, 1.05, 0.7)],
         1 => &[(-0.42, 1.6, 0.52, 0.68), (0.42, 1.6, 0.52, 0.68)],
-        _ => &[(-0.66, 1.6, 0.44, 0.56), (0.0, 1.66, 0.62, 0.72), (0.66, 1.6, 0.44, 0.56)],
+        _ => &[
+            (-0.66, 1.6, 0.44, 0.56),
+            (0.0, 1.66, 0.62, 0.72),
+            (0.66, 1.6, 0.44, 0.56),
+        ],
     };
     for &(x, z, w, h) in gallery {
         things::picture(b, &south.at(shift + x, 0.0, z), w, h);
@@ -219,7 +235,13 @@ fn west_side(b: &mut Builder, west: &Place, hy: f32) {
     }
     things::picture(b, &west.at(x + 0.1, 0.0, 1.72), 0.6, 0.44);
     let bin = Look::plain(srgb(0x565B5F)).gloss(0.3);
-    b.drum(&west.at(x + 0.5 * width - 0.18, -0.3, 0.15), [0.1, 0.13], 0.3, 0.004, bin);
+    b.drum(
+        &west.at(x + 0.5 * width - 0.18, -0.3, 0.15),
+        [0.1, 0.13],
+        0.3,
+        0.004,
+        bin,
+    );
 }
 
 fn north_corners(b: &mut Builder, room: &Place, hx: f32, hy: f32) {
@@ -236,7 +258,12 @@ fn middle(b: &mut Builder, room: &Place, hy: f32) {
     let rug = Look::new(Pattern::Rug, b.palette.rug);
     let turn = b.random.range(-0.05, 0.05);
     let center = room.at(0.0, -hy + 1.72, 0.0);
-    b.block(&center.at(0.0, -0.05, 0.006).turn(turn), [2.5, 1.6, 0.014], 0.005, rug);
+    b.block(
+        &center.at(0.0, -0.05, 0.006).turn(turn),
+        [2.5, 1.6, 0.014],
+        0.005,
+        rug,
+    );
     furniture::coffee_table(b, &center.at(0.0, -0.12, 0.013).turn(turn));
     let tone = b.accent();
     if b.random.chance(0.55) {

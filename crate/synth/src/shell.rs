@@ -29,7 +29,14 @@ pub(crate) fn floor_and_ceiling(b: &mut Builder, room: &Place, size: Vec3) {
 }
 
 /// A wall whose inner face is y = 0 of `at`, with a skirting board.
-pub(crate) fn wall(b: &mut Builder, at: &Place, length: f32, height: f32, hole: Option<Opening>, look: Look) {
+pub(crate) fn wall(
+    b: &mut Builder,
+    at: &Place,
+    length: f32,
+    height: f32,
+    hole: Option<Opening>,
+    look: Look,
+) {
     let look = look.seed(b.random.bits() >> 8);
     let end = 0.5 * length + WALL_M;
     let mut part = |x0: f32, x1: f32, z0: f32, z1: f32| {
@@ -56,9 +63,14 @@ pub(crate) fn wall(b: &mut Builder, at: &Place, length: f32, height: f32, hole: 
             }
         }
     };
-    let white = Look::plain(srgb(0xF2F0EB)).gloss(0.15);
+    let white = Look::plain(srgb(0xF2F0EB));
     for (x0, x1) in skirts {
-        b.block(&at.at(0.5 * (x0 + x1), -0.007, 0.045), [x1 - x0, 0.014, 0.09], 0.003, white);
+        b.block(
+            &at.at(0.5 * (x0 + x1), -0.007, 0.045),
+            [x1 - x0, 0.014, 0.09],
+            0.0,
+            white,
+        );
     }
 }
 
@@ -67,7 +79,11 @@ fn casing(b: &mut Builder, at: &Place, hole: Opening, look: Look) {
     let wide = 0.07;
     let top = hole.sill + hole.height;
     for side in [-1.0, 1.0] {
-        let place = at.at(hole.x + side * 0.5 * (hole.width + wide), -0.01, hole.sill + 0.5 * hole.height);
+        let place = at.at(
+            hole.x + side * 0.5 * (hole.width + wide),
+            -0.01,
+            hole.sill + 0.5 * hole.height,
+        );
         b.block(&place, [wide, 0.02, hole.height], 0.003, look);
     }
     let place = at.at(hole.x, -0.01, top + 0.5 * wide);
@@ -84,12 +100,32 @@ pub(crate) fn window(b: &mut Builder, at: &Place, hole: Opening) {
     b.block(&middle.at(0.0, 0.13, 0.0), [w, 0.06, h], 0.0, garden);
     let bar = 0.055;
     for side in [-1.0, 1.0] {
-        b.block(&middle.at(side * 0.5 * (w - bar), 0.09, 0.0), [bar, 0.06, h], 0.004, white);
-        b.block(&middle.at(0.0, 0.09, side * 0.5 * (h - bar)), [w, 0.06, bar], 0.004, white);
+        b.block(
+            &middle.at(side * 0.5 * (w - bar), 0.09, 0.0),
+            [bar, 0.06, h],
+            0.004,
+            white,
+        );
+        b.block(
+            &middle.at(0.0, 0.09, side * 0.5 * (h - bar)),
+            [w, 0.06, bar],
+            0.004,
+            white,
+        );
     }
     b.block(&middle.at(0.0, 0.085, 0.0), [0.08, 0.07, h], 0.004, white);
-    b.block(&middle.at(0.0, 0.09, 0.2 * h), [w, 0.05, 0.035], 0.004, white);
-    b.block(&at.at(hole.x, -0.03, hole.sill - 0.015), [w + 0.2, 0.24, 0.035], 0.01, white);
+    b.block(
+        &middle.at(0.0, 0.09, 0.2 * h),
+        [w, 0.05, 0.035],
+        0.004,
+        white,
+    );
+    b.block(
+        &at.at(hole.x, -0.03, hole.sill - 0.015),
+        [w + 0.2, 0.24, 0.035],
+        0.01,
+        white,
+    );
     radiator(b, &at.at(hole.x, -0.09, 0.12), 0.62 * w, 0.52);
     curtains(b, at, hole);
 }
@@ -99,10 +135,21 @@ fn radiator(b: &mut Builder, at: &Place, width: f32, height: f32) {
     let ribs = (width / 0.075) as u32;
     for i in 0..ribs {
         let x = (i as f32 + 0.5 - 0.5 * ribs as f32) * 0.075;
-        b.block(&at.at(x, 0.0, 0.5 * height), [0.055, 0.1, height], 0.026, paint);
+        b.block(
+            &at.at(x, 0.0, 0.5 * height),
+            [0.055, 0.1, height],
+            0.026,
+            paint,
+        );
     }
     for z in [0.07, height - 0.07] {
-        b.rod(at, [-0.5 * width, 0.0, z], [0.5 * width, 0.0, z], [0.02, 0.02], paint);
+        b.rod(
+            at,
+            [-0.5 * width, 0.0, z],
+            [0.5 * width, 0.0, z],
+            [0.02, 0.02],
+            paint,
+        );
     }
 }
 
@@ -113,7 +160,13 @@ fn curtains(b: &mut Builder, at: &Place, hole: Opening) {
     let cloth = b.cloth([tone * 0.82, tone.lerp(Vec3::ONE, 0.12)]);
     let rail = Look::plain(srgb(0x4A4038)).gloss(0.5);
     let y = -0.11;
-    b.rod(at, [hole.x - reach, y, top], [hole.x + reach, y, top], [0.014, 0.014], rail);
+    b.rod(
+        at,
+        [hole.x - reach, y, top],
+        [hole.x + reach, y, top],
+        [0.014, 0.014],
+        rail,
+    );
     for side in [-1.0, 1.0] {
         b.ball(&at.at(hole.x + side * reach, y, top), 0.03, rail);
         for fold in 0..8 {
@@ -129,19 +182,51 @@ fn curtains(b: &mut Builder, at: &Place, hole: Opening) {
 /// A panelled door leaf in its hole.
 pub(crate) fn door(b: &mut Builder, at: &Place, hole: Opening) {
     let white = Look::plain(srgb(0xEFEBE2)).gloss(0.25);
-    let wood = if b.random.chance(0.5) { b.wood() } else { white };
+    let wood = if b.random.chance(0.5) {
+        b.wood()
+    } else {
+        white
+    };
     casing(b, at, hole, white);
     let leaf = at.at(hole.x, 0.06, 0.5 * hole.height);
-    b.block(&leaf.at(0.0, 0.05, 0.0), [hole.width, 0.1, hole.height], 0.0, wood);
+    b.block(
+        &leaf.at(0.0, 0.05, 0.0),
+        [hole.width, 0.1, hole.height],
+        0.0,
+        wood,
+    );
     for x in [-1.0, 1.0] {
         for (z, high) in [(-0.29, 0.3), (0.06, 0.28), (0.35, 0.19)] {
             let panel = leaf.at(x * 0.22 * hole.width, 0.0, z * hole.height);
-            b.block(&panel, [0.32 * hole.width, 0.026, high * hole.height], 0.01, wood);
+            b.block(
+                &panel,
+                [0.32 * hole.width, 0.026, high * hole.height],
+                0.01,
+                wood,
+            );
         }
     }
     let brass = Look::plain(srgb(0xB79A5A)).gloss(0.9);
     let handle = leaf.at(0.42 * hole.width, 0.0, -0.02);
-    b.drum(&handle.at(0.0, -0.01, 0.0).lean(std::f32::consts::FRAC_PI_2), [0.026, 0.026], 0.03, 0.004, brass);
-    b.rod(&handle, [0.0, 0.0, 0.0], [0.0, -0.055, 0.0], [0.01, 0.01], brass);
-    b.rod(&handle, [0.012, -0.055, 0.0], [-0.11, -0.055, 0.0], [0.011, 0.009], brass);
+    b.drum(
+        &handle.at(0.0, -0.01, 0.0).lean(std::f32::consts::FRAC_PI_2),
+        [0.026, 0.026],
+        0.03,
+        0.004,
+        brass,
+    );
+    b.rod(
+        &handle,
+        [0.0, 0.0, 0.0],
+        [0.0, -0.055, 0.0],
+        [0.01, 0.01],
+        brass,
+    );
+    b.rod(
+        &handle,
+        [0.012, -0.055, 0.0],
+        [-0.11, -0.055, 0.0],
+        [0.011, 0.009],
+        brass,
+    );
 }

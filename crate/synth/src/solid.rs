@@ -127,7 +127,11 @@ fn drum_field(p: Vec3, bottom: f32, top: f32, half: f32) -> (f32, Vec3) {
     if (0.0..=1.0).contains(&along) {
         return (beside, tilt);
     }
-    let away = if along > 0.5 { from_bottom - slope } else { from_bottom };
+    let away = if along > 0.5 {
+        from_bottom - slope
+    } else {
+        from_bottom
+    };
     let d = away.length();
     if d < 1e-9 {
         return (0.0, up);
@@ -149,8 +153,9 @@ impl Solid {
     /// Opposite corners of the axis-aligned box around the solid.
     pub fn bounds(&self) -> (Vec3, Vec3) {
         let half = self.shape.half_size();
-        let reach =
-            self.axes.x_axis.abs() * half.x + self.axes.y_axis.abs() * half.y + self.axes.z_axis.abs() * half.z;
+        let reach = self.axes.x_axis.abs() * half.x
+            + self.axes.y_axis.abs() * half.y
+            + self.axes.z_axis.abs() * half.z;
         (self.center - reach, self.center + reach)
     }
 

@@ -100,7 +100,8 @@ impl Look {
                 let cell = flat / Vec2::new(0.16, 0.26);
                 let d = (cell.fract_gl() - 0.5).abs();
                 let band = (d.x + d.y - 0.36).abs();
-                let line = stroke(band * 0.16, 0.014, pixel_m) + stroke(d.length() * 0.16 - 0.012, 0.02, pixel_m);
+                let line = stroke(band * 0.16, 0.014, pixel_m)
+                    + stroke(d.length() * 0.16 - 0.012, 0.02, pixel_m);
                 a.lerp(b, line.min(1.0)) * uneven(0.05, 3.0)
             }
             Pattern::Planks => planks(p, pixel_m, self),
@@ -113,14 +114,18 @@ impl Look {
             Pattern::Weave => {
                 let thread = noise(p * 170.0, seed) - 0.5;
                 let patch = noise(p * 28.0, seed) - 0.5;
-                a.lerp(b, 0.35 + 0.9 * thread * fine(0.012) + 0.5 * patch * fine(0.07)) * uneven(0.1, 5.0)
+                a.lerp(
+                    b,
+                    0.45 + 0.8 * thread * fine(0.012) + 0.22 * patch * fine(0.07),
+                ) * uneven(0.07, 5.0)
             }
             Pattern::Checks => {
                 let d = (flat / 0.12).fract_gl();
                 let band = |v: f32| stroke((v - 0.3).abs() * 0.12, 0.05, pixel_m);
                 let thin = |v: f32| stroke((v - 0.8).abs() * 0.12, 0.012, pixel_m);
                 let cloth = a.lerp(b, 0.5 * band(d.x) + 0.5 * band(d.y));
-                cloth.lerp(c, 0.7 * (thin(d.x) + thin(d.y)).min(1.0)) * uneven(0.12 * fine(0.02), 120.0)
+                cloth.lerp(c, 0.7 * (thin(d.x) + thin(d.y)).min(1.0))
+                    * uneven(0.12 * fine(0.02), 120.0)
             }
             Pattern::Stripes => {
                 let v = (flat.x / 0.14).rem_euclid(1.0);
@@ -136,12 +141,21 @@ impl Look {
                 }
                 let z = p.z / half.z;
                 let band = stroke((z.abs() - 0.72).abs() * half.z, 0.012, pixel_m);
-                let title = if z.abs() < 0.45 && p.x.abs() < 0.5 * half.x { 0.75 } else { 0.0 };
+                let title = if z.abs() < 0.45 && p.x.abs() < 0.5 * half.x {
+                    0.75
+                } else {
+                    0.0
+                };
                 let letters = noise(Vec3::new(p.z * 160.0, p.x * 60.0, 3.0), seed);
                 a.lerp(b, band.max(title * letters * fine(0.02))) * uneven(0.1, 20.0)
             }
             Pattern::Cardboard => {
-                let tape = stroke(p.x, 0.055, pixel_m) * if normal.z.abs() > 0.5 || p.z > 0.4 * half.z { 1.0 } else { 0.0 };
+                let tape = stroke(p.x, 0.055, pixel_m)
+                    * if normal.z.abs() > 0.5 || p.z > 0.4 * half.z {
+                        1.0
+                    } else {
+                        0.0
+                    };
                 a.lerp(b, 0.8 * tape) * uneven(0.12, 9.0) * uneven(0.06 * fine(0.02), 90.0)
             }
             Pattern::Wicker => {
@@ -149,12 +163,18 @@ impl Look {
                 let id = cell.floor();
                 let over = (id.x + id.y).rem_euclid(2.0);
                 let round = (cell.fract_gl() - 0.5).abs().max_element();
-                a.lerp(b, 0.5 + (over - 0.5) * 0.8 * fine(0.035)) * (1.0 - 0.5 * round * fine(0.02)) * uneven(0.2, 12.0)
+                a.lerp(b, 0.5 + (over - 0.5) * 0.8 * fine(0.035))
+                    * (1.0 - 0.5 * round * fine(0.02))
+                    * uneven(0.2, 12.0)
             }
             Pattern::Speckle => {
                 let v = noise(p * 70.0, seed);
                 let speck = ((v - 0.62) * 8.0).clamp(0.0, 1.0) * fine(0.03);
-                let tone = if noise(p * 25.0, seed + 1) > 0.5 { b } else { c };
+                let tone = if noise(p * 25.0, seed + 1) > 0.5 {
+                    b
+                } else {
+                    c
+                };
                 a.lerp(tone, speck) * uneven(0.06, 8.0)
             }
             Pattern::Leaf => {
@@ -207,9 +227,15 @@ fn planks(p: Vec3, pixel_m: f32, look: &Look) -> Vec3 {
     let fine = (1.0 - pixel_m / 0.03).max(0.0);
     let beside = p.y - row * WIDTH_M;
     let before = p.x + shift - piece * LENGTH_M;
-    let joint = stroke(beside.min(WIDTH_M - beside), 0.005, pixel_m)
-        .max(stroke(before.min(LENGTH_M - before), 0.005, pixel_m));
-    let wood = look.tones[0].lerp(look.tones[1], 0.55 * tone + 0.3 * bend + 0.35 * grain * fine);
+    let joint = stroke(beside.min(WIDTH_M - beside), 0.005, pixel_m).max(stroke(
+        before.min(LENGTH_M - before),
+        0.005,
+        pixel_m,
+    ));
+    let wood = look.tones[0].lerp(
+        look.tones[1],
+        0.55 * tone + 0.3 * bend + 0.35 * grain * fine,
+    );
     wood * (1.0 - 0.65 * joint)
 }
 
@@ -224,7 +250,11 @@ fn rug(p: Vec3, half: Vec3, pixel_m: f32, look: &Look) -> Vec3 {
         a
     } else if edge < 0.2 {
         // A row of triangles runs along the border.
-        let along = if half.x - p.x.abs() < half.y - p.y.abs() { p.y } else { p.x };
+        let along = if half.x - p.x.abs() < half.y - p.y.abs() {
+            p.y
+        } else {
+            p.x
+        };
         let zig = ((along / 0.13).rem_euclid(1.0) - 0.5).abs() * 2.0;
         if zig > (edge - 0.075) / 0.125 { c } else { b }
     } else if edge < 0.225 {
@@ -237,7 +267,11 @@ fn rug(p: Vec3, half: Vec3, pixel_m: f32, look: &Look) -> Vec3 {
         match ring {
             r if r < 0.22 => a,
             r if r < 0.42 => {
-                if kind { c } else { b }
+                if kind {
+                    c
+                } else {
+                    b
+                }
             }
             r if r < 0.52 => a,
             r if r < 0.94 => b.lerp(c, if kind { 0.12 } else { 0.4 }),
@@ -270,7 +304,8 @@ fn art(p: Vec3, half: Vec3, look: &Look) -> Vec3 {
             let sun = (uv - Vec2::new(0.35, 0.5)).length() < 0.2;
             let mut tone = if sun { c } else { sky };
             for i in 0..4 {
-                let ridge = 0.25 - 0.35 * i as f32 + 0.5 * (noise(Vec3::new(uv.x * 1.7, i as f32, 0.5), look.seed) - 0.3);
+                let ridge = 0.25 - 0.35 * i as f32
+                    + 0.5 * (noise(Vec3::new(uv.x * 1.7, i as f32, 0.5), look.seed) - 0.3);
                 if uv.y < ridge {
                     tone = b.lerp(a, i as f32 / 3.0) * (0.65 + 0.1 * i as f32);
                 }
@@ -279,7 +314,8 @@ fn art(p: Vec3, half: Vec3, look: &Look) -> Vec3 {
         }
         _ => {
             // Soft-edged fields of colour.
-            let wave = uv.y + 0.12 * (noise(Vec3::new(uv.x * 3.0, uv.y * 3.0, 0.0), look.seed) - 0.5);
+            let wave =
+                uv.y + 0.12 * (noise(Vec3::new(uv.x * 3.0, uv.y * 3.0, 0.0), look.seed) - 0.5);
             let field = match wave {
                 w if w > 0.25 => a,
                 w if w > -0.15 => b,
@@ -294,15 +330,22 @@ fn art(p: Vec3, half: Vec3, look: &Look) -> Vec3 {
 
 fn outside(p: Vec3, half: Vec3, seed: u32) -> Vec3 {
     let z = p.z / half.z;
-    let sky = Vec3::new(0.95, 0.97, 1.0).lerp(Vec3::new(0.42, 0.66, 0.98), (0.5 + 0.5 * z).clamp(0.0, 1.0));
-    let cloud = (noise(Vec3::new(p.x * 2.2, p.z * 5.0, 0.0), seed) - 0.5).max(0.0) * 1.6;
+    let wave = |x: f32, y: f32, k: f32| noise(Vec3::new(p.x * x, p.z * y, k), seed);
+    let sky = Vec3::new(0.97, 0.97, 0.95).lerp(
+        Vec3::new(0.52, 0.73, 0.98),
+        (0.35 + 0.65 * z).clamp(0.0, 1.0),
+    );
+    let cloud = 1.5 * (0.65 * wave(1.8, 4.0, 0.0) + 0.35 * wave(5.0, 11.0, 2.0) - 0.45).max(0.0);
     let sky = sky.lerp(Vec3::ONE, cloud.min(1.0));
-    let crown = |scale: f32, k: f32| noise(Vec3::new(p.x * scale, k, 0.0), seed) + 0.25 * noise(Vec3::new(p.x * 16.0, p.z * 16.0, k), seed);
-    let leaves = 0.75 + 0.5 * noise(p * 24.0, seed + 3);
-    if z < -0.75 + 0.5 * crown(3.0, 1.0) {
-        Vec3::new(0.16, 0.33, 0.08) * leaves
-    } else if z < -0.45 + 0.75 * crown(1.5, 5.0) {
-        Vec3::new(0.36, 0.53, 0.30) * leaves
+    // Two rows of trees; crowns are lumps of three sizes, and the far row is hazier.
+    let crown = |x: f32, k: f32| {
+        0.6 * wave(x, 0.0, k) + 0.3 * wave(3.0 * x, 3.0, k + 1.0) + 0.1 * wave(24.0, 24.0, k)
+    };
+    let leaves = 0.72 + 0.3 * wave(9.0, 9.0, 6.0) + 0.22 * wave(40.0, 40.0, 7.0);
+    if z < -0.95 + 0.75 * crown(2.3, 10.0) {
+        Vec3::new(0.30, 0.42, 0.17) * leaves
+    } else if z < -0.62 + 0.9 * crown(1.3, 20.0) {
+        Vec3::new(0.50, 0.61, 0.42) * (0.5 + 0.5 * leaves)
     } else {
         sky
     }
@@ -324,7 +367,11 @@ fn screen(p: Vec3, half: Vec3, look: &Look) -> Vec3 {
     let end = indent + 0.12 + 0.5 * hash_unit(line as i32, 1, 0, look.seed);
     if inside && u > indent && u < end {
         let word = (u * 16.0).floor() as i32;
-        return if hash(line as i32, word, 2, look.seed) % 3 == 0 { accent } else { ink };
+        return if hash(line as i32, word, 2, look.seed) % 3 == 0 {
+            accent
+        } else {
+            ink
+        };
     }
     back
 }

@@ -1,14 +1,13 @@
 //! A frame of the room by ray casting: exact depth, and a colour with two soft lights, sky and bounced light.
 //!
-//! Light is gathered with few rays a pixel in a 4 by 4 pattern of directions and then averaged over the same surface,
-//! so that every pixel gets the sum of 16 directions for the price of one (interleaved sampling, Keller and
-//! Heidrich 2001).
+//! Light is gathered with one ray a pixel to each light and one to anywhere, in a repeating pattern of 64 directions,
+//! and then averaged over the same surface, so that every pixel gets the sum of many directions for the price of one
+//! (interleaved sampling, Keller and Heidrich 2001).
 
 use glam::Vec3;
 
-use crate::camera::Camera;
 use crate::palette::to_srgb;
-use crate::random::hash_unit;
+use crate::path::View;
 use crate::room::{Light, Room};
 
 /// One picture of the room.
@@ -49,80 +48,155 @@ struct Gathered {
 const BOUNCE_REACH_M: f32 = 1.6;
 const AWAY_M: f32 = 1e-3;
 const FAR_M: f32 = 100.0;
+const EXPOSURE: f32 = 0.62;
 
-/// Draws what `camera` sees of `room`.
-pub fn render(room: &Room, camera: &Camera) -> Frame {
-    let (width, height) = (camera.width as usize, camera.height as usize);
+/// Draws what `view` sees of `room`.
+pub fn render(room: &Room, view: &View) -> Frame {
+    let (width, height) = (view.camera.width as usize, view.camera.height as usize);
     let mut points = Vec::with_capacity(width * height);
     let mut depth_m = Vec::with_capacity(width * height);
-    for v in 0..height {
-        for u in 0..width {
-            let ray = camera.ray(u as f32, v as f32);
-            let length = ray.length();
-            let point = look(room, camera, ray / length);
-            depth_m.push(point.t / length);
-            points.push(point);
-        }
-    }
+    for_each_ray(view, |dir, length| {
+        let point = look(room, view, dir);
+        depth_m.push(point.t / length);
+        points.push(point);
+    });
+    let probes = probes();
     let gathered: Vec<_> = (0..points.len())
-        .map(|i| gather(room, &points[i], i % width % 4, i / width % 4))
+        .map(|i| {
+            gather(
+                room,
+                &points[i],
+                &probes[i / width % BLOCK * BLOCK + i % width % BLOCK],
+            )
+        })
         .collect();
-    let smooth = average(&points, &gathered, width);
+    // Quarters of a block first, then the four quarters: the whole block for 20 looks instead of 64.
+    let quarters = average(&points, &gathered, width, BLOCK / 2, 1);
+    let smooth = average(&points, &quarters, width, 2, BLOCK / 2);
     let mut linear: Vec<_> = points
         .iter()
         .zip(&smooth)
         .map(|(point, light)| shade(room, point, light))
         .collect();
-    soften_edges(room, camera, &points, &smooth, &mut linear);
+    soften_edges(room, view, &points, &smooth, &mut linear);
     Frame {
-        width: camera.width,
-        height: camera.height,
-        color: linear.into_iter().map(expose).collect(),
+        width: view.camera.width,
+        height: view.camera.height,
+        color: expose(&linear),
         depth_m,
     }
 }
 
-fn look(room: &Room, camera: &Camera, dir: Vec3) -> Point {
-    let origin = camera.position_m;
+/// The depth of [`render`] alone, in metres along the optical axis, row by row from the top.
+pub fn depth(room: &Room, view: &View) -> Vec<f32> {
+    let mut depth_m = Vec::with_capacity(view.camera.width as usize * view.camera.height as usize);
+    for_each_ray(view, |dir, length| {
+        let t = room
+            .cast(view.position_m, dir, FAR_M)
+            .map_or(0.0, |hit| hit.t);
+        depth_m.push(t / length);
+    });
+    depth_m
+}
+
+/// Gives the unit direction of each pixel's ray, and its length where its part along the optical axis is 1.
+fn for_each_ray(view: &View, mut visit: impl FnMut(Vec3, f32)) {
+    for v in 0..view.camera.height {
+        for u in 0..view.camera.width {
+            let ray = view.ray(u as f32, v as f32);
+            let length = ray.length();
+            visit(ray / length, length);
+        }
+    }
+}
+
+fn look(room: &Room, view: &View, dir: Vec3) -> Point {
+    let origin = view.position_m;
     let Some(hit) = room.cast(origin, dir, FAR_M) else {
-        return Point { dir, ..Point::default() };
+        return Point {
+            dir,
+            ..Point::default()
+        };
     };
     let solid = &room.solids[hit.solid as usize];
     let at = origin + dir * hit.t;
     // A slanting surface spreads over more metres a pixel.
     let slant = (-dir.dot(hit.normal)).max(0.25);
-    let pixel_m = hit.t / camera.focal_px / slant.sqrt();
+    let pixel_m = hit.t / view.camera.fx as f32 / slant.sqrt();
     let local_normal = solid.axes.transpose_mul_vec3(hit.normal);
     Point {
         solid: hit.solid,
         t: hit.t,
         at,
         normal: hit.normal,
-        albedo: solid
-            .look
-            .colour(solid.to_local(at), local_normal, solid.shape.half_size(), pixel_m),
+        albedo: solid.look.colour(
+            solid.to_local(at),
+            local_normal,
+            solid.shape.half_size(),
+            pixel_m,
+        ),
         dir,
     }
 }
 
-/// One ray to a point of each light and one to anywhere, chosen by the pixel's place (`i`, `j`) in the 4 by 4 pattern.
-fn gather(room: &Room, point: &Point, i: usize, j: usize) -> Gathered {
+/// One of the ways in which pixels gather light; 64 of them fill an 8 by 8 block.
+struct Probe {
+    /// Direction over a surface whose normal is z, denser around it in proportion to the cosine.
+    dir: Vec3,
+    /// Place on a light, -1 to 1 both ways.
+    spot: [f32; 2],
+}
+
+const BLOCK: usize = 8;
+
+/// The probes of a block, row by row, ordered so that its 4 by 4 quarters are spread evenly as well.
+fn probes() -> Vec<Probe> {
+    const GOLDEN: f32 = 2.399_963;
+    let count = BLOCK * BLOCK;
+    (0..count)
+        .map(|at| {
+            let (x, y) = (at % BLOCK, at / BLOCK);
+            // The ordered dither matrix of Bayer (1973), from the lowest bit of x and y upwards.
+            let bits = |bit: usize| ((x ^ y) >> bit & 1) << 1 | y >> bit & 1;
+            let index = bits(0) << 4 | bits(1) << 2 | bits(2);
+            let share = (index as f32 + 0.5) / count as f32;
+            // Malley's method on a sunflower; Hammersley's points on the light.
+            let (sin, cos) = libm::sincosf(index as f32 * GOLDEN);
+            let radius = share.sqrt();
+            let mirrored = (index as u32).reverse_bits() as f32 / 4_294_967_296.0;
+            Probe {
+                dir: Vec3::new(radius * cos, radius * sin, (1.0 - share).sqrt()),
+                spot: [2.0 * share - 1.0, 2.0 * mirrored - 1.0],
+            }
+        })
+        .collect()
+}
+
+/// One ray to a point of each light and one to anywhere.
+fn gather(room: &Room, point: &Point, probe: &Probe) -> Gathered {
     let origin = point.at + point.normal * AWAY_M;
-    // A Latin arrangement: neighbours in both directions get strata that lie far apart.
-    let (a, b) = ((i + 2 * j) % 4, (j + 2 * (i / 2) + i) % 4);
     let seen = |light: &Light| {
-        let spot = light.center
-            + light.spread[0] * (0.5 * a as f32 - 0.75)
-            + light.spread[1] * (0.5 * b as f32 - 0.75);
+        let spot = light.center + light.spread[0] * probe.spot[0] + light.spread[1] * probe.spot[1];
         let to = spot - origin;
         let facing = light.facing == Vec3::ZERO || to.dot(light.facing) < 0.0;
         if !facing || to.dot(point.normal) <= 0.0 {
             return 0.0;
         }
         let away = to.length();
-        if room.blocked(origin, to / away, away) { 0.0 } else { 1.0 }
+        if room.blocked(origin, to / away, away) {
+            0.0
+        } else {
+            1.0
+        }
     };
-    let dir = hemisphere(point.normal, i + 4 * j);
+    let side = if point.normal.z.abs() < 0.9 {
+        Vec3::Z
+    } else {
+        Vec3::X
+    };
+    let x = side.cross(point.normal).normalize_or(Vec3::X);
+    let y = point.normal.cross(x);
+    let dir = x * probe.dir.x + y * probe.dir.y + point.normal * probe.dir.z;
     let around = match room.cast(origin, dir, BOUNCE_REACH_M) {
         // What is near gives back the light of its own colour, and keeps the rest away.
         Some(hit) => {
@@ -141,42 +215,37 @@ fn gather(room: &Room, point: &Point, i: usize, j: usize) -> Gathered {
     }
 }
 
-/// One of 16 directions, denser around `normal` in proportion to its cosine.
-fn hemisphere(normal: Vec3, index: usize) -> Vec3 {
-    // Malley's method on a sunflower of 16 points.
-    const GOLDEN: f32 = 2.399_963;
-    let radius = ((index as f32 + 0.5) / 16.0).sqrt();
-    let (sin, cos) = libm::sincosf(index as f32 * GOLDEN);
-    let side = if normal.z.abs() < 0.9 { Vec3::Z } else { Vec3::X };
-    let x = side.cross(normal).normalize_or(Vec3::X);
-    let y = normal.cross(x);
-    x * (radius * cos) + y * (radius * sin) + normal * (1.0 - radius * radius).sqrt()
-}
-
 /// Light from the rest of the room: a pale ceiling above, warm floor below.
 fn surroundings(dir: Vec3) -> Vec3 {
     let up = 0.5 + 0.5 * dir.z;
-    Vec3::new(0.30, 0.26, 0.22).lerp(Vec3::new(0.60, 0.61, 0.62), up)
+    Vec3::new(0.37, 0.33, 0.28).lerp(Vec3::new(0.66, 0.65, 0.63), up)
 }
 
-/// Averages light over the 4 by 4 pixels around each, as far as they belong to the same smooth surface.
-fn average(points: &[Point], gathered: &[Gathered], width: usize) -> Vec<Gathered> {
+/// Averages light over `taps` by `taps` pixels around each, `step` apart, as far as they belong to the same smooth
+/// surface.
+fn average(
+    points: &[Point],
+    gathered: &[Gathered],
+    width: usize,
+    taps: usize,
+    step: usize,
+) -> Vec<Gathered> {
     let height = points.len() / width;
+    let span = taps * step;
+    let start = |at: usize, size: usize| at.saturating_sub(span / 2).min(size.saturating_sub(span));
     let mut smooth = Vec::with_capacity(points.len());
     for (i, point) in points.iter().enumerate() {
-        let (u, v) = (i % width, i / width);
-        let u0 = u.saturating_sub(2).min(width.saturating_sub(4));
-        let v0 = v.saturating_sub(2).min(height.saturating_sub(4));
+        let (u0, v0) = (start(i % width, width), start(i / width, height));
+        let apart = 0.01 + 0.01 * point.t;
         let mut sum = Gathered::default();
         let mut count = 0.0f32;
-        let apart = 0.01 + 0.008 * point.t;
-        for row in v0..(v0 + 4).min(height) {
-            for k in row * width + u0..row * width + (u0 + 4).min(width) {
-                let other = &points[k];
+        for v in (v0..height.min(v0 + span)).step_by(step) {
+            for u in (u0..width.min(u0 + span)).step_by(step) {
+                let other = &points[v * width + u];
                 let same = other.normal.dot(point.normal) > 0.85
                     && (other.at - point.at).dot(point.normal).abs() < apart;
                 if same {
-                    let light = &gathered[k];
+                    let light = &gathered[v * width + u];
                     sum.window += light.window;
                     sum.lamp += light.lamp;
                     sum.around += light.around;
@@ -184,7 +253,11 @@ fn average(points: &[Point], gathered: &[Gathered], width: usize) -> Vec<Gathere
                 }
             }
         }
-        let share = 1.0 / count.max(1.0);
+        if count == 0.0 {
+            smooth.push(gathered[i]);
+            continue;
+        }
+        let share = 1.0 / count;
         smooth.push(Gathered {
             window: sum.window * share,
             lamp: sum.lamp * share,
@@ -203,7 +276,11 @@ fn shade(room: &Room, point: &Point, light: &Gathered) -> Vec3 {
         let to = source.center - point.at;
         let away = to.length().max(1e-3);
         let to = to / away;
-        let given = if source.facing == Vec3::ZERO { 1.0 } else { 0.25 + 0.75 * (-to.dot(source.facing)).max(0.0) };
+        let given = if source.facing == Vec3::ZERO {
+            1.0
+        } else {
+            0.25 + 0.75 * (-to.dot(source.facing)).max(0.0)
+        };
         let power = source.power * (seen * given / (0.6 + away * away));
         diffuse += power * to.dot(point.normal).max(0.0);
         if look.gloss > 0.0 {
@@ -221,8 +298,14 @@ fn shade(room: &Room, point: &Point, light: &Gathered) -> Vec3 {
 
 /// Casts three more rays where neighbours belong to different surfaces, with the light of the pixel next to it that
 /// belongs to what the ray found.
-fn soften_edges(room: &Room, camera: &Camera, points: &[Point], smooth: &[Gathered], linear: &mut [Vec3]) {
-    let width = camera.width as usize;
+fn soften_edges(
+    room: &Room,
+    view: &View,
+    points: &[Point],
+    smooth: &[Gathered],
+    linear: &mut [Vec3],
+) {
+    let width = view.camera.width as usize;
     let sharp = linear.to_vec();
     for i in 0..points.len() {
         let (u, v) = (i % width, i / width);
@@ -248,9 +331,11 @@ fn soften_edges(room: &Room, camera: &Camera, points: &[Point], smooth: &[Gather
         }
         let mut sum = sharp[i];
         for (dx, dy) in [(0.375, 0.125), (-0.125, 0.375), (-0.25, -0.375)] {
-            let dir = camera.ray(u as f32 + dx, v as f32 + dy).normalize();
-            let point = look(room, camera, dir);
-            let like = |k: &usize| points[*k].solid == point.solid && points[*k].normal.dot(point.normal) > 0.8;
+            let dir = view.ray(u as f32 + dx, v as f32 + dy).normalize();
+            let point = look(room, view, dir);
+            let like = |k: &usize| {
+                points[*k].solid == point.solid && points[*k].normal.dot(point.normal) > 0.8
+            };
             let source = std::iter::once(i).chain(around).find(like).unwrap_or(i);
             sum += shade(room, &point, &smooth[source]);
         }
@@ -259,13 +344,19 @@ fn soften_edges(room: &Room, camera: &Camera, points: &[Point], smooth: &[Gather
 }
 
 /// Linear light to sRGB through a film curve (the ACES fit by Narkowicz, 2015).
-fn expose(linear: Vec3) -> [u8; 3] {
-    let x = linear * 0.62;
-    let film = x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14);
-    film.to_array().map(to_srgb)
-}
-
-/// A number in `[0, 1)` for a pixel of a frame, for the sensor's noise.
-pub(crate) fn pixel_chance(frame: usize, pixel: usize, draw: i32) -> f32 {
-    hash_unit(pixel as i32, frame as i32, draw, 0x5EED)
+fn expose(linear: &[Vec3]) -> Vec<[u8; 3]> {
+    // Square roots spread the dark end of the table as the eye does.
+    const STEPS: f32 = 1023.0;
+    let table: Vec<u8> = (0..=STEPS as u32)
+        .map(|i| i as f32 / STEPS)
+        .map(|root| to_srgb(root * root))
+        .collect();
+    let channel = |x: f32| {
+        let film = x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14);
+        table[(film.clamp(0.0, 1.0).sqrt() * STEPS + 0.5) as usize]
+    };
+    linear
+        .iter()
+        .map(|light| (*light * EXPOSURE).to_array().map(channel))
+        .collect()
 }
