@@ -170,4 +170,11 @@ impl Builder {
         let accents = self.palette.accents;
         self.random.pick(&accents)
     }
+
+    /// Three different accents.
+    pub fn accents(&mut self) -> [Vec3; 3] {
+        let from = self.palette.accents;
+        let first = self.random.below(4) as usize;
+        [0, 1, 2].map(|k| from[(first + k) % 4])
+    }
 }

@@ -62,7 +62,7 @@ impl Room {
         Self {
             solids: b.solids,
             bvh,
-            size_m: if quarter % 2 == 0 {
+            size_m: if quarter.is_multiple_of(2) {
                 size
             } else {
                 Vec3::new(size.y, size.x, size.z)
@@ -161,7 +161,7 @@ fn furnish(b: &mut Builder, room: &Place, size: Vec3) -> (Light, Light) {
             north.axes.z_axis * 0.42 * glass.height,
         ],
         facing: -north.axes.y_axis,
-        power: Vec3::new(5.0, 5.05, 5.1),
+        power: Vec3::new(7.0, 7.0, 7.0),
     };
     let lamp = Light {
         center: lamp,

@@ -56,7 +56,8 @@ fn pillows(b: &mut Builder, at: &Place, inner: f32, seats: u32) {
         &[0.0]
     };
     for (i, spot) in spots.iter().enumerate() {
-        let tones = [b.accent(), b.accent(), b.palette.rug[0]];
+        let [ground, band, _] = b.accents();
+        let tones = [ground, band, b.palette.rug[0]];
         let pattern = b
             .random
             .pick(&[Pattern::Checks, Pattern::Stripes, Pattern::Weave]);

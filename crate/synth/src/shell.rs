@@ -122,7 +122,7 @@ pub(crate) fn window(b: &mut Builder, at: &Place, hole: Opening) {
     );
     b.block(
         &at.at(hole.x, -0.03, hole.sill - 0.015),
-        [w + 0.2, 0.24, 0.035],
+        [w + 0.01, 0.24, 0.035],
         0.01,
         white,
     );
@@ -155,7 +155,7 @@ fn radiator(b: &mut Builder, at: &Place, width: f32, height: f32) {
 
 fn curtains(b: &mut Builder, at: &Place, hole: Opening) {
     let top = hole.sill + hole.height + 0.16;
-    let reach = 0.5 * hole.width + 0.42;
+    let reach = 0.5 * hole.width + 0.49;
     let tone = b.accent();
     let cloth = b.cloth([tone * 0.82, tone.lerp(Vec3::ONE, 0.12)]);
     let rail = Look::plain(srgb(0x4A4038)).gloss(0.5);

@@ -367,7 +367,7 @@ fn screen(p: Vec3, half: Vec3, look: &Look) -> Vec3 {
     let end = indent + 0.12 + 0.5 * hash_unit(line as i32, 1, 0, look.seed);
     if inside && u > indent && u < end {
         let word = (u * 16.0).floor() as i32;
-        return if hash(line as i32, word, 2, look.seed) % 3 == 0 {
+        return if hash(line as i32, word, 2, look.seed).is_multiple_of(3) {
             accent
         } else {
             ink

@@ -220,7 +220,7 @@ pub(crate) fn picture(b: &mut Builder, at: &Place, width: f32, height: f32) {
             look,
         );
     }
-    let tones = [b.accent(), b.accent(), b.accent()];
+    let tones = b.accents();
     let art = Look::new(Pattern::Art, tones).gloss(0.1);
     b.block(
         &at.at(0.0, -0.009, 0.0),
@@ -283,7 +283,7 @@ pub(crate) fn basket(b: &mut Builder, at: &Place) {
         [srgb(0x9A6F42), srgb(0xD0A972), srgb(0xD0A972)],
     );
     b.drum(&at.at(0.0, 0.0, 0.16), [0.17, 0.21], 0.32, 0.02, straw);
-    let tones = [b.accent(), b.accent()];
+    let tones = b.accents();
     let wool = b.cloth([tones[0] * 0.8, tones[0]]);
     b.ball(&at.at(-0.07, 0.03, 0.31), 0.1, wool);
     let ball = Look::new(Pattern::Stripes, [tones[1], Vec3::splat(0.8), tones[0]]).gloss(0.2);

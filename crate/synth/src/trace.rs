@@ -203,7 +203,7 @@ fn gather(room: &Room, point: &Point, probe: &Probe) -> Gathered {
             let near = 1.0 - hit.t / BOUNCE_REACH_M;
             let look = &room.solids[hit.solid as usize].look;
             let tone = look.tones[0].lerp(look.tones[1], 0.5);
-            let bounced = tone * (0.34 + 0.5 * look.glow);
+            let bounced = tone * (0.30 + 0.5 * look.glow);
             surroundings(dir).lerp(bounced, near.sqrt())
         }
         None => surroundings(dir),
@@ -218,7 +218,7 @@ fn gather(room: &Room, point: &Point, probe: &Probe) -> Gathered {
 /// Light from the rest of the room: a pale ceiling above, warm floor below.
 fn surroundings(dir: Vec3) -> Vec3 {
     let up = 0.5 + 0.5 * dir.z;
-    Vec3::new(0.37, 0.33, 0.28).lerp(Vec3::new(0.66, 0.65, 0.63), up)
+    Vec3::new(0.30, 0.27, 0.23).lerp(Vec3::new(0.60, 0.60, 0.59), up)
 }
 
 /// Averages light over `taps` by `taps` pixels around each, `step` apart, as far as they belong to the same smooth

@@ -111,7 +111,12 @@ fn a_seed_names_the_same_picture_everywhere() {
         let room = Room::new(seed);
         fingerprint(&render(&room, &path(&room, 4, 64, 48)[1]))
     };
-    assert_eq!(picture(3), 0x0, "found {:#018x}", picture(3));
+    assert_eq!(
+        picture(3),
+        0xF491_51EF_00CA_2314,
+        "found {:#018x}",
+        picture(3)
+    );
     assert_ne!(picture(3), picture(4));
 }
 
@@ -155,6 +160,26 @@ fn the_mesh_is_the_surface() {
             facing > 0.0,
             "a triangle at {a} is turned away from its normal"
         );
+    }
+}
+
+#[test]
+fn distance_is_that_to_the_nearest_surface() {
+    let room = Room::new(11);
+    let tree = PointIndex::new(&mesh::sample::surface(&room.mesh(), 600_000, 2));
+    let mut chance = mesh::sample::Uniform::new(5);
+    let mut checked = 0;
+    while checked < 2000 {
+        let share = Vec3::from([(); 3].map(|()| chance.next() as f32)) - Vec3::new(0.5, 0.5, 0.0);
+        let p = share * room.size_m();
+        let (told, found) = (room.distance(p), tree.distance(p));
+        if told > 0.05 {
+            assert!(
+                (told - found).abs() < 0.03,
+                "{told} m told at {p}, {found} m to the mesh"
+            );
+            checked += 1;
+        }
     }
 }
 
