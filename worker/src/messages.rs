@@ -9,8 +9,11 @@ use tsify::Tsify;
 
 /// From the page to the worker.
 #[derive(Deserialize, Tsify)]
-#[tsify(from_wasm_abi)]
-#[serde(tag = "type", rename_all = "camelCase", rename_all_fields = "camelCase")]
+#[serde(
+    tag = "type",
+    rename_all = "camelCase",
+    rename_all_fields = "camelCase"
+)]
 pub enum Request {
     /// First message. The canvas itself is passed beside it.
     Start {
@@ -118,7 +121,11 @@ pub enum MeshFormat {
 
 /// Pointer, wheel and keys, in physical pixels of the canvas.
 #[derive(Deserialize, Tsify)]
-#[serde(tag = "kind", rename_all = "camelCase", rename_all_fields = "camelCase")]
+#[serde(
+    tag = "kind",
+    rename_all = "camelCase",
+    rename_all_fields = "camelCase"
+)]
 pub enum InputEvent {
     /// A button or finger goes down.
     PointerDown {
@@ -232,8 +239,11 @@ pub enum LookAt {
 
 /// From the worker to the page.
 #[derive(Serialize, Tsify)]
-#[tsify(into_wasm_abi)]
-#[serde(tag = "type", rename_all = "camelCase", rename_all_fields = "camelCase")]
+#[serde(
+    tag = "type",
+    rename_all = "camelCase",
+    rename_all_fields = "camelCase"
+)]
 pub enum Event {
     /// The engine is up.
     Ready {

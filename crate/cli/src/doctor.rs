@@ -40,7 +40,10 @@ fn print(report: &Report) {
         "frames       {} ({} with colour, {} with depth), {} keyframes",
         report.frames, report.color_frames, report.depth_frames, report.keyframes
     );
-    for (name, camera) in [("colour", &report.color_camera), ("depth", &report.depth_camera)] {
+    for (name, camera) in [
+        ("colour", &report.color_camera),
+        ("depth", &report.depth_camera),
+    ] {
         if let Some(camera) = camera {
             println!(
                 "{name:12} {} x {}, fx {:.2} fy {:.2} cx {:.2} cy {:.2}",

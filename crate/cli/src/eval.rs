@@ -82,7 +82,10 @@ fn print(report: &Report) {
     println!("chamfer      {:.4} m", surface.chamfer_m);
     println!("precision    {:.4}", surface.precision);
     println!("recall       {:.4}", surface.recall);
-    println!("F            {:.4} at {} m", surface.f_score, surface.threshold_m);
+    println!(
+        "F            {:.4} at {} m",
+        surface.f_score, surface.threshold_m
+    );
     if let Some(depth) = &report.depth {
         println!("abs rel      {:.4}", depth.abs_rel);
         println!("abs diff     {:.4} m", depth.abs_diff);

@@ -59,7 +59,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if !arguments.canonical {
         let scan_from_canonical = scan.scan_from_canonical();
         mesh.transform(&scan_from_canonical);
-        up = scan_from_canonical.transform_vector3(glam::DVec3::Z).as_vec3();
+        up = scan_from_canonical
+            .transform_vector3(glam::DVec3::Z)
+            .as_vec3();
     }
     format.write(&mesh, up, &arguments.output)?;
     eprintln!(

@@ -12,9 +12,7 @@ pub struct Terminal {
 impl Terminal {
     /// Shows nothing yet.
     pub fn new() -> Self {
-        Self {
-            bar: bar("", 0),
-        }
+        Self { bar: bar("", 0) }
     }
 
     /// Ends the last bar.

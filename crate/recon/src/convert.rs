@@ -15,11 +15,17 @@ pub(crate) fn depth_view<'a>(
         depth_m: &depth.depth_m,
         depth_camera: pinhole(&frame.depth_camera),
         color: color.map(|image| (image.rgb.as_slice(), pinhole(&frame.color_camera))),
-        world_from_camera: Affine3A::from_mat4(glam::DMat4::from(frame.pose).as_mat4()),
+        world_from_camera: pose(frame),
     }
 }
 
-pub(crate) fn pinhole(camera: &Camera) -> Pinhole {
+/// A frame's pose, camera to canonical world, in single precision.
+pub fn pose(frame: &Frame) -> Affine3A {
+    Affine3A::from_mat4(glam::DMat4::from(frame.pose).as_mat4())
+}
+
+/// A scan's camera as the mesh's rasteriser and the volume take it.
+pub fn pinhole(camera: &Camera) -> Pinhole {
     Pinhole {
         width: camera.width,
         height: camera.height,

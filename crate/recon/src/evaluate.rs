@@ -50,7 +50,9 @@ pub struct Report {
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluateError {
     /// VoRTX's protocol renders into the scan's cameras.
-    #[error("the VoRTX protocol renders into the scan's cameras: expected a scan, found none; add --scan FOLDER")]
+    #[error(
+        "the VoRTX protocol renders into the scan's cameras: expected a scan, found none; add --scan FOLDER"
+    )]
     NoScan,
     /// Nothing to compare.
     #[error("expected a {which} mesh with vertices, found none in it")]
@@ -142,10 +144,12 @@ fn depth_figures(
     progress: &mut impl FnMut(usize, usize),
 ) -> Option<Depth2d> {
     let total = scan.frames().len();
-    let frames = depths(scan).enumerate().filter_map(|(done, (view, depth_m))| {
-        progress(done + 1, total);
-        metrics::depth_2d(&protocol::vortx_render(pred, &view), &depth_m)
-    });
+    let frames = depths(scan)
+        .enumerate()
+        .filter_map(|(done, (view, depth_m))| {
+            progress(done + 1, total);
+            metrics::depth_2d(&protocol::vortx_render(pred, &view), &depth_m)
+        });
     metrics::depth::mean(&frames.collect::<Vec<_>>())
 }
 

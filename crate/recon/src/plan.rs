@@ -110,7 +110,9 @@ pub fn plan(scan: &Scan, limits: &Limits, options: Options) -> Result<Plan, Plan
     }
     let frames = scan.frames();
     let kept = keyframes(frames, KeyframeRule::default());
-    let kept = kept.into_iter().filter(|&frame| frames[frame].depth.is_some());
+    let kept = kept
+        .into_iter()
+        .filter(|&frame| frames[frame].depth.is_some());
     let keyframes: Vec<usize> = kept.step_by(options.every).collect();
 
     let mut remarks = Vec::new();
@@ -136,7 +138,10 @@ pub fn plan(scan: &Scan, limits: &Limits, options: Options) -> Result<Plan, Plan
             options.voxel_size_m * 100.0,
         ));
     };
-    let picture_bytes = keyframes.iter().map(|&frame| picture_bytes(&frames[frame])).max();
+    let picture_bytes = keyframes
+        .iter()
+        .map(|&frame| picture_bytes(&frames[frame]))
+        .max();
     Ok(Plan {
         options,
         frames: frames.len(),
@@ -169,7 +174,10 @@ fn check(options: &Options) -> Result<(), PlanError> {
 
 fn picture_bytes(frame: &scan::Frame) -> usize {
     let pixels = |camera: &scan::Camera| camera.width as usize * camera.height as usize;
-    let color = frame.color.as_ref().map_or(0, |_| pixels(&frame.color_camera) * 7);
+    let color = frame
+        .color
+        .as_ref()
+        .map_or(0, |_| pixels(&frame.color_camera) * 7);
     color + pixels(&frame.depth_camera) * 4
 }
 

@@ -23,7 +23,9 @@ pub enum RunError {
     #[error(transparent)]
     Volume(#[from] VolumeError),
     /// Not one depth image could be used.
-    #[error("expected depth in {keyframes} keyframes, found none that can be used; the findings say what is wrong with each")]
+    #[error(
+        "expected depth in {keyframes} keyframes, found none that can be used; the findings say what is wrong with each"
+    )]
     NothingFused {
         /// Keyframes tried.
         keyframes: usize,

@@ -268,7 +268,8 @@ fn middle(b: &mut Builder, room: &Place, hy: f32) {
     let tone = b.accent();
     if b.random.chance(0.55) {
         let at = center.at(0.8, 1.05, 0.0).turn(-0.6);
-        seating::sofa(b, &at, 0.86, 1, [tone * 0.75, tone]);
+        let pale = tone.lerp(Vec3::splat(0.5), 0.15);
+        seating::sofa(b, &at, 0.86, 1, [pale * 0.75, pale]);
     } else {
         seating::pouf(b, &center.at(0.85, 0.62, 0.013));
         seating::pouf(b, &center.at(-0.5, 0.85, 0.0));

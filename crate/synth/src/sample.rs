@@ -44,7 +44,7 @@ impl SampleScan {
 
     /// The sample the page starts with: 36 pictures of 320 by 240 pixels.
     pub fn first() -> Self {
-        Self::new(3, 36, 320, 240)
+        Self::new(17, 36, 320, 240)
     }
 
     /// The same walk in another layout.

@@ -99,9 +99,7 @@ impl Arena {
         source_offset_bytes: u64,
         vertex_count: u32,
     ) -> Result<(), ArenaError> {
-        if let Some((buffer, bytes)) = self.remove(brick) {
-            encoder.clear_buffer(&buffer, bytes.start, Some(bytes.end - bytes.start));
-        }
+        self.erase(encoder, brick);
         if let Some((buffer, at)) = self.place(brick, vertex_count)? {
             let bytes = u64::from(vertex_count) * VERTEX_STRIDE_BYTES;
             encoder.copy_buffer_to_buffer(source, source_offset_bytes, buffer, at, bytes);
@@ -189,6 +187,13 @@ impl Arena {
                 (!merged.is_empty()).then_some((&page.buffer, merged))
             })
             .collect()
+    }
+
+    /// Takes a brick away.
+    pub fn erase(&mut self, encoder: &mut wgpu::CommandEncoder, brick: [i32; 3]) {
+        if let Some((buffer, bytes)) = self.remove(brick) {
+            encoder.clear_buffer(&buffer, bytes.start, Some(bytes.end - bytes.start));
+        }
     }
 
     /// Frees a brick's room: the buffer and bytes to zero.

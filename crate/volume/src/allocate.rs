@@ -78,9 +78,18 @@ impl Marks {
         }
         let (first, size) = (self.first, self.size);
         let position = move |index: i32| {
-            first + IVec3::new(index % size.x, index / size.x % size.y, index / (size.x * size.y))
+            first
+                + IVec3::new(
+                    index % size.x,
+                    index / size.x % size.y,
+                    index / (size.x * size.y),
+                )
         };
-        let marked = self.marked.iter().enumerate().filter(|(_, marked)| **marked);
+        let marked = self
+            .marked
+            .iter()
+            .enumerate()
+            .filter(|(_, marked)| **marked);
         marked.map(|(index, _)| position(index as i32)).collect()
     }
 }

@@ -19,7 +19,9 @@ pub enum VolumeError {
         max_depth_m: f32,
     },
     /// An image whose length is not width times height.
-    #[error("expected a {what} image of {expected} values ({width} x {height}), found {found}; check the camera that was given with it")]
+    #[error(
+        "expected a {what} image of {expected} values ({width} x {height}), found {found}; check the camera that was given with it"
+    )]
     ImageSize {
         /// Depth or colour.
         what: &'static str,
@@ -33,7 +35,9 @@ pub enum VolumeError {
         found: usize,
     },
     /// A voxel size, truncation or depth that no volume can have.
-    #[error("expected {what} to be a positive number of metres, found {found}; set it to something like {example}")]
+    #[error(
+        "expected {what} to be a positive number of metres, found {found}; set it to something like {example}"
+    )]
     Setting {
         /// Which setting.
         what: &'static str,
@@ -43,10 +47,14 @@ pub enum VolumeError {
         example: f32,
     },
     /// The device failed to give a result back.
-    #[error("the device did not return a result ({0}); it may have been lost: start again, with larger voxels if it happens again")]
+    #[error(
+        "the device did not return a result ({0}); it may have been lost: start again, with larger voxels if it happens again"
+    )]
     Device(String),
     /// A tensor of another type than the kernels work with.
-    #[error("expected {expected:?} values on the device, found {found:?}; this is a defect of the program, please report it")]
+    #[error(
+        "expected {expected:?} values on the device, found {found:?}; this is a defect of the program, please report it"
+    )]
     Type {
         /// What the kernels need.
         expected: DType,

@@ -205,7 +205,10 @@ impl Volume {
                 colors.push(weight);
             }
         }
-        let slots: Vec<i32> = bricks.iter().map(|&brick| self.lattice.slot(brick)).collect();
+        let slots: Vec<i32> = bricks
+            .iter()
+            .map(|&brick| self.lattice.slot(brick))
+            .collect();
         self.field.set(slots, samples, colors);
         self.mark_changed(bricks);
         Ok(())
@@ -213,7 +216,9 @@ impl Volume {
 
     /// Makes room for bricks and gives them their slots.
     fn reserve(&mut self, bricks: &[Brick]) -> Result<(), VolumeError> {
-        let fresh = bricks.iter().filter(|&&brick| self.lattice.slot(brick) == EMPTY_SLOT);
+        let fresh = bricks
+            .iter()
+            .filter(|&&brick| self.lattice.slot(brick) == EMPTY_SLOT);
         let limit = self.config.brick_limit();
         let needed = self.lattice.slot_count() + fresh.count();
         if needed > limit + 1 {

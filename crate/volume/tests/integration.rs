@@ -37,7 +37,11 @@ fn look(pose: &Affine3A, wall_m: f32) -> (Vec<f32>, Vec<u8>) {
             let half = ((0.16 - miss) / ray.length_squared()).max(0.0).sqrt();
             let hit_ball = miss < 0.16 && b > 0.0;
             depth.push(if hit_ball { b - half } else { to_wall });
-            rgb.extend(if hit_ball { [220, 40, 30] } else { [40, 90, 200] });
+            rgb.extend(if hit_ball {
+                [220, 40, 30]
+            } else {
+                [40, 90, 200]
+            });
         }
     }
     (depth, rgb)
@@ -45,9 +49,16 @@ fn look(pose: &Affine3A, wall_m: f32) -> (Vec<f32>, Vec<u8>) {
 
 fn poses() -> Vec<Affine3A> {
     let at = |x: f32, z: f32, turn: f32| {
-        Affine3A::from_rotation_translation(Quat::from_rotation_z(turn) * upright(), Vec3::new(x, -0.3, z))
+        Affine3A::from_rotation_translation(
+            Quat::from_rotation_z(turn) * upright(),
+            Vec3::new(x, -0.3, z),
+        )
     };
-    vec![at(0.0, 0.0, 0.0), at(0.25, 0.1, 0.12), at(-0.3, -0.15, -0.15)]
+    vec![
+        at(0.0, 0.0, 0.0),
+        at(0.25, 0.1, 0.12),
+        at(-0.3, -0.15, -0.15),
+    ]
 }
 
 fn fuse(volume: &mut Volume, wall_m: f32) {
@@ -109,14 +120,20 @@ on_each_device! {
 
 /// Rounding may move a projection across the border of a pixel, so a few vertices at depth edges may differ.
 fn assert_same(expected: &Mesh, found: &Mesh) {
-    let (a, b) = (expected.positions.len() as f64, found.positions.len() as f64);
+    let (a, b) = (
+        expected.positions.len() as f64,
+        found.positions.len() as f64,
+    );
     assert!((a / b - 1.0).abs() < 2e-3, "{a} vertices, then {b}");
     let index = mesh::nearest::PointIndex::new(&expected.positions);
     let distances = index.distances(&found.positions);
     let mean = distances.iter().sum::<f32>() / distances.len() as f32;
     let far = distances.iter().filter(|&&d| d > 1e-4).count();
     assert!(mean < 1e-4, "mean distance {mean} m");
-    assert!((far as f64) < b * 5e-3, "{far} of {b} vertices differ by more than 0.1 mm");
+    assert!(
+        (far as f64) < b * 5e-3,
+        "{far} of {b} vertices differ by more than 0.1 mm"
+    );
     let color = |mesh: &Mesh| {
         let sum = mesh.colors.iter().map(|c| c.map(f64::from));
         let sum = sum.fold([0.0; 3], |s, c| std::array::from_fn(|i| s[i] + c[i]));

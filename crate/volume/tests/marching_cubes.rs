@@ -119,7 +119,10 @@ struct GoldenField {
 
 /// Vertices - edges + faces.
 fn euler(mesh: &Mesh) -> i64 {
-    let sides = mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+    let sides = mesh
+        .triangles
+        .iter()
+        .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
     let edges: HashSet<(u32, u32)> = sides.map(|(a, b)| (a.min(b), a.max(b))).collect();
     mesh.positions.len() as i64 - edges.len() as i64 + mesh.triangles.len() as i64
 }

@@ -70,7 +70,6 @@ pub(super) async fn extract(
     let totals = totals.into_data_async().await;
     let totals = totals.map_err(|error| VolumeError::Device(error.to_string()))?;
     let totals: Vec<i32> = totals
-        
         .try_to_vec()
         .map_err(|error| VolumeError::Device(format!("{error:?}")))?;
 
@@ -351,12 +350,9 @@ fn emit_kernel(
         }
 
         let to = (first + corner) as usize * VERTEX;
-        vertices[to] =
-            ((records[record] * 8 + x) as f32 + t * ex as f32) * voxel_size_m;
-        vertices[to + 1] =
-            ((records[record + 1] * 8 + y) as f32 + t * ey as f32) * voxel_size_m;
-        vertices[to + 2] =
-            ((records[record + 2] * 8 + z) as f32 + t * ez as f32) * voxel_size_m;
+        vertices[to] = ((records[record] * 8 + x) as f32 + t * ex as f32) * voxel_size_m;
+        vertices[to + 1] = ((records[record + 1] * 8 + y) as f32 + t * ey as f32) * voxel_size_m;
+        vertices[to + 2] = ((records[record + 2] * 8 + z) as f32 + t * ez as f32) * voxel_size_m;
         vertices[to + 3] = pack_normal(nx, ny, nz);
         vertices[to + 4] = packed;
         vertices[to + 5] = ((x + 9 * (y + 9 * z)) * 3 + axis) as f32;

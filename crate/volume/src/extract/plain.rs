@@ -134,12 +134,20 @@ impl Block {
             let distance = self.distance.clone().select(0, point.clone());
             let weight = self.weight.clone().select(0, point);
             case = case + distance.clone().lower_elem(0.0).int().cast(DType::I32) * (1 << corner);
-            observed = observed + weight.greater_elem(rule.least_weight).int().cast(DType::I32);
+            observed = observed
+                + weight
+                    .greater_elem(rule.least_weight)
+                    .int()
+                    .cast(DType::I32);
             highest = highest.max_pair(distance.clone());
             lowest = lowest.min_pair(distance);
         }
         let smooth = (highest - lowest).lower_elem(rule.largest_jump);
-        case * observed.equal_elem(8).bool_and(smooth).int().cast(DType::I32)
+        case * observed
+            .equal_elem(8)
+            .bool_and(smooth)
+            .int()
+            .cast(DType::I32)
     }
 
     /// `[vertices, 6]` on the `edge`s of the `cell`s.
@@ -181,7 +189,10 @@ impl Block {
         let mut columns = Vec::with_capacity(VERTEX);
         for axis in 0..3 {
             let bricks = records.chunks_exact(BRICK_RECORD);
-            let start = ints(bricks.map(|record| record[axis] * 8).collect(), &self.device);
+            let start = ints(
+                bricks.map(|record| record[axis] * 8).collect(),
+                &self.device,
+            );
             let whole = start.select(0, brick.clone()) + place[axis].clone();
             let part = t.clone() * along[axis].clone().float();
             columns.push((whole.float() + part) * voxel_size_m);

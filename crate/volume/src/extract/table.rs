@@ -129,12 +129,18 @@ mod tests {
             }
             // What does not cancel is drawn on a face, where the neighbouring cell draws its opposite.
             for ((a, b), count) in sides {
-                assert!(count.abs() <= 1, "case {case}: side {a}-{b} used {count} times");
+                assert!(
+                    count.abs() <= 1,
+                    "case {case}: side {a}-{b} used {count} times"
+                );
                 if count != 0 {
                     let on = |face: &[usize; 4], e: usize| {
                         (0..4).any(|i| edge(face[i], face[(i + 1) % 4]) == e)
                     };
-                    assert!(FACES.iter().any(|face| on(face, a) && on(face, b)), "case {case}");
+                    assert!(
+                        FACES.iter().any(|face| on(face, a) && on(face, b)),
+                        "case {case}"
+                    );
                 }
             }
         }

@@ -36,10 +36,8 @@ fn integrate_batch(
     let device = field.device().clone();
     let bricks = records.len() / BRICK_RECORD;
     let slots: Vec<i32> = records.iter().step_by(BRICK_RECORD).copied().collect();
-    let slots = Tensor::<1, Int>::from_data(
-        TensorData::new(slots, [bricks]),
-        (&device, DType::I32),
-    );
+    let slots =
+        Tensor::<1, Int>::from_data(TensorData::new(slots, [bricks]), (&device, DType::I32));
     let [x, y, z] = camera_points(records, camera, &device);
 
     let rule = camera.rule;

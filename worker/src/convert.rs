@@ -1,0 +1,126 @@
+//! Between the messages and the rooms' own types.
+
+use crate::messages::{
+    FindingMessage, InputEvent, PlanSummary, RunOptions, ShadingMode, StageName, ViewOptions,
+};
+use recon::{Options, Plan, Stage};
+use scan::{Finding, Gravity, GravitySource};
+use view::{Input, Look, PointerKind, Shading, Theme};
+
+pub fn options(message: RunOptions) -> Options {
+    Options {
+        voxel_size_m: message.voxel_size_m,
+        every: message.every as usize,
+        max_depth_m: message.max_depth_m,
+    }
+}
+
+pub fn run_options(options: Options) -> RunOptions {
+    RunOptions {
+        voxel_size_m: options.voxel_size_m,
+        every: options.every as u32,
+        max_depth_m: options.max_depth_m,
+    }
+}
+
+pub fn plan_summary(plan: &Plan) -> PlanSummary {
+    PlanSummary {
+        options: run_options(plan.options),
+        frames: plan.frames as u32,
+        keyframes: plan.keyframes.len() as u32,
+        bricks: plan.bricks as u32,
+        device_bytes: plan.device_bytes as f64,
+        heap_bytes: plan.heap_bytes as f64,
+        remarks: plan.remarks.clone(),
+    }
+}
+
+pub fn stage_name(stage: Stage) -> StageName {
+    match stage {
+        Stage::WarmingUp => StageName::WarmingUp,
+        Stage::Fusing => StageName::Fusing,
+        Stage::Meshing => StageName::Meshing,
+    }
+}
+
+pub fn finding(finding: &Finding) -> FindingMessage {
+    FindingMessage {
+        severity: finding.severity.to_string(),
+        code: finding.code.to_owned(),
+        file: finding.file.clone(),
+        line: finding.line,
+        expected: finding.expected.clone(),
+        found: finding.found.clone(),
+        advice: finding.advice.clone(),
+    }
+}
+
+pub fn gravity(gravity: &Gravity) -> String {
+    match (gravity.source, gravity.planes_from_cameras_deg) {
+        (GravitySource::Format, _) => "as the files have it".to_owned(),
+        (GravitySource::Estimated, Some(_)) => format!(
+            "found from the cameras and the room's planes, {:.0} degrees from the files' Z",
+            gravity.rotated_deg
+        ),
+        (GravitySource::Estimated, None) => format!(
+            "guessed from the cameras alone, {:.0} degrees from the files' Z",
+            gravity.rotated_deg
+        ),
+    }
+}
+
+pub fn look(view: ViewOptions, floor_height_m: f32) -> Look {
+    Look {
+        shading: match view.shading {
+            ShadingMode::Color => Shading::Color,
+            ShadingMode::Normal => Shading::Normal,
+            ShadingMode::Wireframe => Shading::Wireframe,
+            ShadingMode::Depth => Shading::Depth,
+        },
+        theme: if view.dark { Theme::DARK } else { Theme::LIGHT },
+        cull_back: !view.back_faces,
+        show_frusta: view.cameras,
+        show_grid: true,
+        floor_height_m,
+    }
+}
+
+/// `None` for a double click: that is a question to the painter, not a movement.
+pub fn input(event: InputEvent) -> Option<Input> {
+    Some(match event {
+        InputEvent::PointerDown {
+            id,
+            x,
+            y,
+            button,
+            touch,
+            shift,
+        } => Input::PointerDown {
+            id,
+            x,
+            y,
+            button,
+            kind: if touch {
+                PointerKind::Touch
+            } else {
+                PointerKind::Mouse
+            },
+            shift,
+        },
+        InputEvent::PointerMove { id, x, y } => Input::PointerMove { id, x, y },
+        InputEvent::PointerUp { id } => Input::PointerUp { id },
+        InputEvent::Wheel { delta, x, y } => Input::Wheel { dy: delta, x, y },
+        InputEvent::Key { code, down } => Input::Key { code, down },
+        InputEvent::Resize {
+            width_px,
+            height_px,
+            pixel_ratio,
+        } => Input::Resize {
+            width_px,
+            height_px,
+            scale: pixel_ratio,
+        },
+        InputEvent::Blur => Input::Blur,
+        InputEvent::DoubleClick { .. } => return None,
+    })
+}

@@ -1,0 +1,432 @@
+//! The engine as the worker script holds it: requests are handed to tasks, and the tasks share what is here.
+
+use crate::{
+    convert,
+    files::{DroppedFolder, DroppedZip},
+    job::{self, Origin},
+    messages::{DeviceChoice, Event, InputEvent, LookAt, Request},
+    platform,
+    stage::{Gpu, Stage},
+};
+use burn::tensor::{Device, wgpu::WgpuSetup};
+use glam::{Vec2, Vec3};
+use js_sys::{Function, Uint8Array};
+use recon::{Limits, Plan};
+use scan::Scan;
+use std::{
+    cell::{Cell, RefCell},
+    rc::Rc,
+};
+use tsify::{Ts, Tsify};
+use view::CameraPose;
+use volume::{BrickMeshes, Volume, VolumeError};
+use wasm_bindgen::{JsValue, prelude::wasm_bindgen};
+use wasm_bindgen_futures::spawn_local;
+use web_sys::{File, OffscreenCanvas};
+
+/// The largest binding that is used even where more is allowed.
+const BINDING_BYTES: u64 = 1 << 30;
+/// While a run is on and nobody touches the view, this long between two pictures leaves the device to the run.
+const RUN_FRAME_MS: f64 = 200.0;
+/// The device takes this many of burn's tasks at a time: small submits keep the page's frames coming.
+const TASKS_A_SUBMIT: usize = 16;
+
+/// Where a run stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RunState {
+    Idle,
+    Running,
+    Pausing,
+    Paused,
+    Stopping,
+}
+
+/// Everything that the tasks share.
+pub struct Engine {
+    emit: Function,
+    pub device: Device,
+    pub limits: Limits,
+    stage: RefCell<Option<Stage>>,
+    scan: RefCell<Option<Rc<Scan>>>,
+    plan: RefCell<Option<Rc<Plan>>>,
+    volume: RefCell<Option<Rc<Volume>>>,
+    state: Cell<RunState>,
+    frame_asked: Cell<bool>,
+    last_frame_ms: Cell<f64>,
+    /// The visitor moved the view since it last came to rest.
+    touched: Cell<bool>,
+}
+
+/// The engine's handle for the worker script.
+#[wasm_bindgen(js_name = Engine)]
+pub struct Handle(Rc<Engine>);
+
+#[wasm_bindgen(js_class = Engine)]
+impl Handle {
+    /// Finds a device and starts the engine on it. `emit` is called with every event, and with the bytes beside it.
+    ///
+    /// # Errors
+    /// When neither WebGPU nor the CPU can be used, or `request` is not `start`.
+    pub async fn start(
+        canvas: Option<OffscreenCanvas>,
+        request: Ts<Request>,
+        emit: Function,
+    ) -> Result<Handle, JsValue> {
+        console_error_panic_hook::set_once();
+        let Request::Start {
+            width_px,
+            height_px,
+            pixel_ratio,
+            device,
+        } = read(&request)?
+        else {
+            return Err(js_sys::Error::new("the first message must be `start`").into());
+        };
+        let engine = Rc::new(Engine::find(canvas, device, emit).await?);
+        engine.input(InputEvent::Resize {
+            width_px,
+            height_px,
+            pixel_ratio,
+        });
+        Ok(Handle(engine))
+    }
+
+    /// Takes a request; the work goes on in tasks of its own.
+    ///
+    /// # Errors
+    /// When `request` is none of the messages.
+    pub fn handle(&self, request: Ts<Request>, files: Vec<File>) -> Result<(), JsValue> {
+        let engine = self.0.clone();
+        match read(&request)? {
+            Request::Start { .. } => {}
+            Request::OpenFolder { paths } => {
+                let folder = DroppedFolder::new(paths, files);
+                spawn_local(job::open(engine, Origin::Folder(folder)));
+            }
+            Request::OpenZip => {
+                if let Some(file) = files.into_iter().next() {
+                    spawn_local(job::open(engine, Origin::Zip(DroppedZip(file))));
+                }
+            }
+            Request::OpenSample { seed } => {
+                spawn_local(job::open(engine, Origin::Sample(seed)));
+            }
+            Request::Replan { options } => {
+                job::plan(&engine, convert::options(options));
+            }
+            Request::Run { options } => spawn_local(job::run(engine, options)),
+            Request::Pause => engine.change(RunState::Running, RunState::Pausing),
+            Request::Resume => {
+                engine.change(RunState::Pausing, RunState::Running);
+                engine.change(RunState::Paused, RunState::Running);
+            }
+            Request::Cancel => engine.stop(),
+            Request::Export {
+                id,
+                format,
+                canonical,
+            } => spawn_local(job::export(engine, id, format, canonical)),
+            Request::Screenshot { id } => spawn_local(job::screenshot(engine, id)),
+            Request::Input { input } => engine.input(input),
+            Request::View { view } => engine.on_stage(|stage| {
+                stage.look = convert::look(view, stage.look.floor_height_m);
+                stage.controls.set_reduced_motion(view.reduced_motion);
+            }),
+            Request::Look { at } => engine.look(at),
+        }
+        Ok(())
+    }
+}
+
+fn read(request: &Ts<Request>) -> Result<Request, JsValue> {
+    let request = request.to_rust();
+    request.map_err(|error| js_sys::Error::new(&error.to_string()).into())
+}
+
+impl Engine {
+    async fn find(
+        canvas: Option<OffscreenCanvas>,
+        choice: DeviceChoice,
+        emit: Function,
+    ) -> Result<Self, JsValue> {
+        let mut note = None;
+        if choice == DeviceChoice::Auto {
+            let options = Device::wgpu_options().tasks_max(TASKS_A_SUBMIT);
+            match options.init_with_setup_async().await {
+                Ok((device, setup)) => {
+                    return Self::on_gpu(canvas, device, setup, emit).map_err(JsValue::from);
+                }
+                Err(error) => {
+                    note = Some(format!(
+                        "WebGPU is not to be had in this browser ({}); the work is done by the processor, more slowly",
+                        error
+                            .to_string()
+                            .lines()
+                            .next()
+                            .unwrap_or("no reason given"),
+                    ));
+                }
+            }
+        }
+        let stage = canvas.map(Stage::on_cpu).transpose()?;
+        let engine = Self::new(emit, Device::flex(), Limits::default(), stage);
+        engine.emit(&Event::Ready {
+            device: "cpu".to_owned(),
+            adapter: "burn flex, one thread".to_owned(),
+            note: note.or_else(|| Some("The processor was asked for".to_owned())),
+        });
+        Ok(engine)
+    }
+
+    fn on_gpu(
+        canvas: Option<OffscreenCanvas>,
+        device: Device,
+        setup: WgpuSetup,
+        emit: Function,
+    ) -> Result<Self, String> {
+        let info = setup.adapter.get_info();
+        let words = format!("{} {}", info.name, info.driver);
+        let words_lower = words.to_lowercase();
+        let is_software = ["swiftshader", "llvmpipe", "lavapipe"]
+            .iter()
+            .any(|name| words_lower.contains(name))
+            || info.device_type == wgpu::DeviceType::Cpu;
+        let binding_bytes = setup.device.limits().max_storage_buffer_binding_size;
+        let limits = Limits {
+            binding_bytes: binding_bytes.min(BINDING_BYTES) as usize,
+        };
+        let lost = emit.clone();
+        setup
+            .device
+            .set_device_lost_callback(move |reason, message| {
+                let event = Event::Failed {
+                    code: "device".to_owned(),
+                    message: format!("The graphics device was lost ({reason:?}: {message})"),
+                    advice: "Start again, with larger voxels if it happens again.".to_owned(),
+                };
+                if let Ok(event) = event.into_js() {
+                    let _ = lost.call1(&JsValue::NULL, &event);
+                }
+            });
+        let gpu = Gpu {
+            instance: setup.instance,
+            adapter: setup.adapter,
+            device: setup.device,
+            queue: setup.queue,
+            is_software,
+        };
+        let stage = canvas
+            .map(|canvas| Stage::on_gpu(canvas, gpu))
+            .transpose()?;
+        let engine = Self::new(emit, device, limits, stage);
+        engine.emit(&Event::Ready {
+            device: "webgpu".to_owned(),
+            adapter: words.trim().to_owned(),
+            note: None,
+        });
+        Ok(engine)
+    }
+
+    fn new(emit: Function, device: Device, limits: Limits, stage: Option<Stage>) -> Self {
+        Self {
+            emit,
+            device,
+            limits,
+            stage: RefCell::new(stage),
+            scan: RefCell::default(),
+            plan: RefCell::default(),
+            volume: RefCell::default(),
+            state: Cell::new(RunState::Idle),
+            frame_asked: Cell::new(false),
+            last_frame_ms: Cell::new(0.0),
+            touched: Cell::new(false),
+        }
+    }
+
+    /// Tells the page.
+    pub fn emit(&self, event: &Event) {
+        if let Ok(event) = event.into_js() {
+            let _ = self.emit.call1(&JsValue::NULL, &event);
+        }
+    }
+
+    /// Tells the page, with bytes beside it.
+    pub fn emit_with(&self, event: &Event, bytes: &Uint8Array) {
+        if let Ok(event) = event.into_js() {
+            let _ = self.emit.call2(&JsValue::NULL, &event, bytes);
+        }
+    }
+
+    /// Tells that work cannot go on.
+    pub fn fail(&self, code: &str, message: String, advice: String) {
+        self.emit(&Event::Failed {
+            code: code.to_owned(),
+            message,
+            advice,
+        });
+    }
+
+    pub fn state(&self) -> RunState {
+        self.state.get()
+    }
+
+    pub fn set_state(&self, state: RunState) {
+        self.state.set(state);
+    }
+
+    fn change(&self, from: RunState, to: RunState) {
+        if self.state() == from {
+            self.set_state(to);
+        }
+    }
+
+    fn stop(&self) {
+        if self.state() != RunState::Idle {
+            self.set_state(RunState::Stopping);
+        }
+    }
+
+    /// Ends a run that is on, so that another can begin.
+    pub async fn stop_and_wait(&self) {
+        while self.state() != RunState::Idle {
+            self.stop();
+            platform::sleep_ms(10).await;
+        }
+    }
+
+    /// Clears the stage for a run.
+    pub fn begin(self: &Rc<Self>, brick_size_m: f32) {
+        self.set_state(RunState::Running);
+        self.volume.take();
+        self.on_stage(|stage| stage.clear(brick_size_m));
+    }
+
+    pub fn scan(&self) -> Option<Rc<Scan>> {
+        self.scan.borrow().clone()
+    }
+
+    pub fn set_scan(&self, scan: Scan) {
+        self.volume.take();
+        self.plan.take();
+        self.scan.replace(Some(Rc::new(scan)));
+    }
+
+    pub fn plan(&self) -> Option<Rc<Plan>> {
+        self.plan.borrow().clone()
+    }
+
+    pub fn set_plan(&self, plan: Plan) {
+        self.plan.replace(Some(Rc::new(plan)));
+    }
+
+    pub fn volume(&self) -> Option<Rc<Volume>> {
+        self.volume.borrow().clone()
+    }
+
+    pub fn set_volume(&self, volume: Volume) {
+        self.volume.replace(Some(Rc::new(volume)));
+    }
+
+    pub fn set_cameras(self: &Rc<Self>, poses: &[CameraPose]) {
+        self.on_stage(|stage| stage.frusta.set(poses));
+    }
+
+    /// Bricks and triangles on show.
+    pub fn counts(&self) -> (u32, u32) {
+        let stage = self.stage.try_borrow();
+        stage.map_or((0, 0), |stage| stage.as_ref().map_or((0, 0), Stage::counts))
+    }
+
+    /// Where the visitor stands; `None` where nobody watches.
+    pub fn eye(&self) -> Option<Vec3> {
+        let stage = self.stage.borrow();
+        stage.as_ref().map(|stage| stage.controls.camera().eye_m())
+    }
+
+    /// Shows new versions of bricks.
+    pub async fn show(self: &Rc<Self>, meshes: BrickMeshes) -> Result<(), VolumeError> {
+        // The stage is taken out while its painter waits for the device, so that a message in between finds none
+        // instead of a borrowed one.
+        let stage = self.stage.take();
+        if let Some(mut stage) = stage {
+            let shown = stage.show(meshes).await;
+            self.stage.replace(Some(stage));
+            self.ask_frame();
+            shown?;
+        }
+        Ok(())
+    }
+
+    pub fn painted_canvas(&self) -> Option<OffscreenCanvas> {
+        self.stage.borrow_mut().as_mut().map(Stage::painted_canvas)
+    }
+
+    /// Changes the stage and has it drawn.
+    fn on_stage(self: &Rc<Self>, change: impl FnOnce(&mut Stage)) {
+        if let Some(stage) = self.stage.borrow_mut().as_mut() {
+            change(stage);
+        }
+        self.ask_frame();
+    }
+
+    fn input(self: &Rc<Self>, event: InputEvent) {
+        self.touched.set(true);
+        self.on_stage(|stage| match event {
+            InputEvent::DoubleClick { x, y } => stage.focus_at(Vec2::new(x, y)),
+            event => {
+                if let Some(input) = convert::input(event) {
+                    stage.input(input);
+                }
+            }
+        });
+    }
+
+    fn look(self: &Rc<Self>, at: LookAt) {
+        self.touched.set(true);
+        self.on_stage(|stage| match at {
+            LookAt::Home => stage.controls.home(),
+            LookAt::Top => stage.controls.top(),
+            LookAt::Keyframe { index } => {
+                let index = index as usize;
+                if let Some(pose) = stage.frusta.poses().get(index).copied() {
+                    stage.frusta.highlight(Some(index));
+                    let (from, lens) = (pose.world_from_camera, pose.pinhole);
+                    stage.controls.look_through(from, lens);
+                }
+            }
+        });
+    }
+
+    fn ask_frame(self: &Rc<Self>) {
+        if !self.frame_asked.replace(true) {
+            let engine = self.clone();
+            platform::on_next_frame(move || engine.frame());
+        }
+    }
+
+    fn frame(self: &Rc<Self>) {
+        self.frame_asked.set(false);
+        let now_ms = platform::now_ms();
+        let since_ms = now_ms - self.last_frame_ms.get();
+        let busy = !matches!(self.state(), RunState::Idle | RunState::Paused);
+        if busy && !self.touched.get() && since_ms < RUN_FRAME_MS {
+            return self.ask_frame();
+        }
+        let Ok(mut stage) = self.stage.try_borrow_mut() else {
+            return self.ask_frame();
+        };
+        let Some(stage) = stage.as_mut() else {
+            return;
+        };
+        self.last_frame_ms.set(now_ms);
+        // After a rest the clock says nothing about the motion.
+        let dt_s = (since_ms / 1000.0).min(0.1) as f32;
+        if stage.frame(dt_s) {
+            self.ask_frame();
+        } else if self.touched.replace(false) {
+            self.emit(&Event::CameraChanged {
+                description: stage.description(),
+            });
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! The visitor's files as a scan's source: read in place when they are needed, never all at once.
+
+use js_sys::Uint8Array;
+use scan::{Entry, RandomRead, Source, SourceError};
+use std::{collections::HashMap, io};
+use web_sys::{Blob, File, FileReaderSync};
+
+/// A dropped folder.
+pub struct DroppedFolder {
+    name: String,
+    entries: Vec<Entry>,
+    files: HashMap<String, File>,
+}
+
+impl DroppedFolder {
+    /// The files of a folder and their paths in it.
+    pub fn new(paths: Vec<String>, files: Vec<File>) -> Self {
+        let first = paths.first().and_then(|path| path.split_once('/'));
+        let name = first.map_or("scan", |(folder, _)| folder).to_owned();
+        let entries = paths.iter().zip(&files).map(|(path, file)| Entry {
+            path: path.clone(),
+            size_bytes: file.size() as u64,
+        });
+        Self {
+            name,
+            entries: entries.collect(),
+            files: paths.into_iter().zip(files).collect(),
+        }
+    }
+
+    fn file(&self, path: &str) -> Result<&File, SourceError> {
+        self.files.get(path).ok_or_else(|| SourceError::NotFound {
+            path: path.to_owned(),
+        })
+    }
+}
+
+impl Source for DroppedFolder {
+    fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    fn read(&self, path: &str) -> Result<Vec<u8>, SourceError> {
+        read(self.file(path)?).map_err(|error| unreadable(path, &error))
+    }
+
+    fn read_head(&self, path: &str, len: usize) -> Result<Vec<u8>, SourceError> {
+        let file = self.file(path)?;
+        read_range(file, 0, len.min(file.size() as usize)).map_err(|error| unreadable(path, &error))
+    }
+
+    fn name(&self) -> &str {
+        &self.name
+    }
+}
+
+fn unreadable(path: &str, error: &io::Error) -> SourceError {
+    SourceError::Unreadable {
+        path: path.to_owned(),
+        cause: error.to_string(),
+    }
+}
+
+/// A dropped zip, read by ranges.
+pub struct DroppedZip(pub File);
+
+impl RandomRead for DroppedZip {
+    fn len_bytes(&self) -> u64 {
+        self.0.size() as u64
+    }
+
+    fn read_at(&self, offset: u64, len: usize) -> io::Result<Vec<u8>> {
+        read_range(&self.0, offset, len)
+    }
+}
+
+fn read_range(file: &File, offset: u64, len: usize) -> io::Result<Vec<u8>> {
+    let end = offset as f64 + len as f64;
+    let part = file.slice_with_f64_and_f64(offset as f64, end);
+    let bytes = read(&part.map_err(|error| failed(&error))?)?;
+    if bytes.len() == len {
+        return Ok(bytes);
+    }
+    Err(io::Error::new(
+        io::ErrorKind::UnexpectedEof,
+        format!("{len} bytes at {offset} go beyond the file's end"),
+    ))
+}
+
+/// The whole of a file or of a part of one. A worker may wait for it; a page may not.
+fn read(blob: &Blob) -> io::Result<Vec<u8>> {
+    let reader = FileReaderSync::new().map_err(|error| failed(&error))?;
+    let buffer = reader.read_as_array_buffer(blob);
+    let buffer = buffer.map_err(|error| failed(&error))?;
+    Ok(Uint8Array::new(&buffer).to_vec())
+}
+
+fn failed(error: &wasm_bindgen::JsValue) -> io::Error {
+    let message = js_sys::Reflect::get(error, &"message".into()).ok();
+    let message = message.and_then(|message| message.as_string());
+    io::Error::other(message.unwrap_or_else(|| "the browser refused to read it".to_owned()))
+}

@@ -1,0 +1,67 @@
+//! From burn's tensors to the picture: on the GPU by a copy from burn's buffer into the arena's, never through the heap.
+
+use burn_cubecl::CubeBackend;
+use cubecl::wgpu::{AutoCompiler, WgpuServer};
+use view::{Arena, CpuPainter};
+use volume::{BrickMeshes, VolumeError};
+
+const VERTEX_BYTES: u64 = mesh::soup::VERTEX_STRIDE_BYTES;
+
+fn lost(error: impl std::fmt::Debug) -> VolumeError {
+    VolumeError::Device(format!("{error:?}"))
+}
+
+/// Copies bricks into the arena on the device that both share.
+pub fn to_arena(
+    meshes: BrickMeshes,
+    arena: &mut Arena,
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+) -> Result<(), VolumeError> {
+    let BrickMeshes { vertices, ranges } = meshes;
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
+        label: Some("bricks to arena"),
+    });
+    if vertices.dims()[0] == 0 {
+        for (brick, _) in ranges {
+            arena.erase(&mut encoder, brick.to_array());
+        }
+        queue.submit([encoder.finish()]);
+        return Ok(());
+    }
+    let cube = vertices.try_into_primitive::<CubeBackend>().map_err(lost)?;
+    let resource = cube
+        .client
+        .get_resource::<WgpuServer<AutoCompiler>>(cube.handle.clone())
+        .map_err(lost)?;
+    // What burn has queued must run first; from here on the shared queue keeps the order.
+    cube.client.flush().map_err(lost)?;
+    let source = resource.resource();
+    for (brick, rows) in ranges {
+        let offset = source.offset + rows.start as u64 * VERTEX_BYTES;
+        let count = rows.len() as u32;
+        let inserted = arena.insert(
+            &mut encoder,
+            brick.to_array(),
+            &source.buffer,
+            offset,
+            count,
+        );
+        inserted.map_err(|error| VolumeError::Device(error.to_string()))?;
+    }
+    queue.submit([encoder.finish()]);
+    Ok(())
+}
+
+/// Reads bricks and gives them to the painter that works without a GPU.
+pub async fn to_painter(meshes: BrickMeshes, painter: &mut CpuPainter) -> Result<(), VolumeError> {
+    let BrickMeshes { vertices, ranges } = meshes;
+    let [_, numbers] = vertices.dims();
+    let data = vertices.into_data_async().await.map_err(lost)?;
+    let soup = data.as_slice::<f32>().map_err(lost)?;
+    for (brick, rows) in ranges {
+        let part = &soup[rows.start * numbers..rows.end * numbers];
+        painter.insert(brick.to_array(), part);
+    }
+    Ok(())
+}

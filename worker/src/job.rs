@@ -1,0 +1,347 @@
+//! The engine's work: open, plan, run, export. Each is a task of its own; between two steps the event loop turns.
+
+use crate::{
+    convert,
+    engine::{Engine, RunState},
+    files::{DroppedFolder, DroppedZip},
+    messages::{Event, FindingMessage, MeshFormat, RunOptions, StageName},
+    platform,
+};
+use glam::{DVec3, Vec3};
+use js_sys::{Promise, Uint8Array};
+use recon::{Flow, Options, Sink, Stage};
+use scan::{Finding, Scan, ScanError, Source, ZipSource};
+use std::rc::Rc;
+use view::CameraPose;
+use volume::{BrickMeshes, VolumeError};
+use wasm_bindgen::JsValue;
+use wasm_bindgen_futures::JsFuture;
+use web_sys::{Blob, ImageEncodeOptions};
+
+/// How long a paused run waits before it looks again.
+const PAUSE_TURN_MS: i32 = 40;
+
+/// Where a scan comes from.
+pub enum Origin {
+    Folder(DroppedFolder),
+    Zip(DroppedZip),
+    Sample(u32),
+}
+
+/// Opens a scan and plans its run.
+pub async fn open(engine: Rc<Engine>, origin: Origin) {
+    engine.emit(&Event::Stage {
+        stage: StageName::Opening,
+    });
+    engine.stop_and_wait().await;
+    // A turn for the page to show the stage: reading a large scan takes its time.
+    platform::sleep_ms(0).await;
+    match open_source(origin).and_then(scan::open) {
+        Ok(scan) => opened(&engine, scan),
+        Err(error) => fail_scan(&engine, &error),
+    }
+}
+
+fn open_source(origin: Origin) -> Result<Rc<dyn Source>, ScanError> {
+    Ok(match origin {
+        Origin::Folder(folder) => Rc::new(folder),
+        Origin::Zip(zip) => {
+            let name = zip.0.name();
+            Rc::new(ZipSource::open_named(&name, zip)?)
+        }
+        Origin::Sample(seed) => Rc::new(synth::SampleScan::new(u64::from(seed), 36, 320, 240)),
+    })
+}
+
+fn fail_scan(engine: &Engine, error: &ScanError) {
+    let (message, advice) = match error.finding() {
+        Some(finding) => {
+            engine.emit(&Event::Finding {
+                finding: convert::finding(finding),
+            });
+            let place = finding.file.as_ref().map_or(String::new(), |file| {
+                let line = finding
+                    .line
+                    .map_or(String::new(), |line| format!(":{line}"));
+                format!("{file}{line}: ")
+            });
+            let text = format!(
+                "{place}expected {}, found {}",
+                finding.expected, finding.found
+            );
+            (text, finding.advice.clone())
+        }
+        None => {
+            let text = error.to_string();
+            let (message, advice) = text.split_once(". ").unwrap_or((&text, ""));
+            let (message, advice) = (message.to_owned(), advice.to_owned());
+            engine.emit(&Event::Finding {
+                finding: source_finding(&message, &advice),
+            });
+            (message, advice)
+        }
+    };
+    engine.fail("scan", message, advice);
+}
+
+/// A fault of the folder or the archive itself, whose text reads `place: expected …, found …`.
+fn source_finding(message: &str, advice: &str) -> FindingMessage {
+    let (file, rest) = match message.split_once(": expected ") {
+        Some((file, rest)) => (Some(file.to_owned()), rest),
+        None => (None, message),
+    };
+    let (expected, found) = rest.split_once(", found ").unwrap_or((rest, ""));
+    FindingMessage {
+        severity: "error".to_owned(),
+        code: "source".to_owned(),
+        file,
+        line: None,
+        expected: expected.to_owned(),
+        found: found.to_owned(),
+        advice: advice.to_owned(),
+    }
+}
+
+fn opened(engine: &Rc<Engine>, scan: Scan) {
+    engine.emit(&Event::Opened {
+        name: scan.name().to_owned(),
+        format: scan.format().to_string(),
+        frames: scan.frames().len() as u32,
+        has_depth: scan.has_depth(),
+        gravity: convert::gravity(scan.gravity()),
+    });
+    for finding in scan.findings() {
+        engine.emit(&Event::Finding {
+            finding: convert::finding(finding),
+        });
+    }
+    engine.set_scan(scan);
+    plan(engine, Options::default());
+}
+
+/// Plans and tells; whether there is a plan.
+pub fn plan(engine: &Rc<Engine>, options: Options) -> bool {
+    let Some(scan) = engine.scan() else {
+        return false;
+    };
+    match recon::plan(&scan, &engine.limits, options) {
+        Ok(plan) => {
+            engine.emit(&Event::Planned {
+                plan: convert::plan_summary(&plan),
+            });
+            let frames = scan.frames();
+            let poses = plan.keyframes.iter().map(|&frame| CameraPose {
+                world_from_camera: recon::pose(&frames[frame]),
+                pinhole: recon::pinhole(&frames[frame].depth_camera),
+            });
+            engine.set_cameras(&poses.collect::<Vec<_>>());
+            engine.set_plan(plan);
+            true
+        }
+        Err(error) => {
+            let text = error.to_string();
+            let (message, advice) = text.split_once("; ").unwrap_or((&text, ""));
+            engine.fail("scan", message.to_owned(), advice.to_owned());
+            false
+        }
+    }
+}
+
+/// Runs the plan.
+pub async fn run(engine: Rc<Engine>, options: RunOptions) {
+    engine.stop_and_wait().await;
+    let options = convert::options(options);
+    let current = engine.plan().is_some_and(|plan| plan.options == options);
+    if !current && !plan(&engine, options) {
+        return;
+    }
+    let (Some(scan), Some(plan)) = (engine.scan(), engine.plan()) else {
+        let advice = "Open a scan first.".to_owned();
+        engine.fail("scan", "There is no scan to work on".to_owned(), advice);
+        return;
+    };
+    engine.begin(plan.volume.voxel_size_m * volume::BRICK_EDGE as f32);
+    let mut sink = PageSink {
+        engine: engine.clone(),
+        started_ms: platform::now_ms(),
+        total: 0,
+    };
+    let result = recon::run(&scan, &plan, &engine.device, &mut sink).await;
+    engine.set_state(RunState::Idle);
+    match result {
+        Ok(outcome) => {
+            let (_, triangles) = engine.counts();
+            let event = Event::Finished {
+                cancelled: outcome.stopped,
+                frames: outcome.frames_fused as u32,
+                bricks: outcome.volume.brick_count() as u32,
+                triangles,
+                elapsed_s: sink.elapsed_s(),
+                heap_bytes: platform::heap_bytes(),
+            };
+            engine.set_volume(outcome.volume);
+            engine.emit(&event);
+        }
+        Err(error) => {
+            let text = error.to_string();
+            let (message, advice) = text.split_once("; ").unwrap_or((&text, ""));
+            let code = match error {
+                recon::RunError::Volume(VolumeError::TooManyBricks { .. }) => "memory",
+                recon::RunError::Volume(_) => "device",
+                recon::RunError::NothingFused { .. } => "scan",
+            };
+            engine.fail(code, message.to_owned(), advice.to_owned());
+        }
+    }
+}
+
+/// Tells the page about a run, and lets it hold or stop it.
+struct PageSink {
+    engine: Rc<Engine>,
+    started_ms: f64,
+    total: usize,
+}
+
+impl PageSink {
+    fn elapsed_s(&self) -> f64 {
+        (platform::now_ms() - self.started_ms) / 1000.0
+    }
+}
+
+impl Sink for PageSink {
+    fn stage(&mut self, stage: Stage, total: usize) {
+        self.total = total;
+        self.engine.emit(&Event::Stage {
+            stage: convert::stage_name(stage),
+        });
+    }
+
+    fn progress(&mut self, done: usize) {
+        let (_, triangles) = self.engine.counts();
+        self.engine.emit(&Event::Progress {
+            done: done as u32,
+            total: self.total as u32,
+            triangles,
+            elapsed_s: self.elapsed_s(),
+        });
+    }
+
+    fn finding(&mut self, finding: Finding) {
+        self.engine.emit(&Event::Finding {
+            finding: convert::finding(&finding),
+        });
+    }
+
+    fn eye(&self) -> Option<Vec3> {
+        self.engine.eye()
+    }
+
+    async fn bricks(&mut self, meshes: BrickMeshes) -> Result<(), VolumeError> {
+        self.engine.show(meshes).await?;
+        let (bricks, triangles) = self.engine.counts();
+        self.engine.emit(&Event::Bricks { bricks, triangles });
+        Ok(())
+    }
+
+    async fn checkpoint(&mut self) -> Flow {
+        platform::sleep_ms(0).await;
+        if self.engine.state() == RunState::Pausing {
+            let held_ms = platform::now_ms();
+            self.engine.set_state(RunState::Paused);
+            self.engine.emit(&Event::Paused);
+            while self.engine.state() == RunState::Paused {
+                platform::sleep_ms(PAUSE_TURN_MS).await;
+            }
+            self.started_ms += platform::now_ms() - held_ms;
+            if self.engine.state() == RunState::Running {
+                self.engine.emit(&Event::Resumed);
+            }
+        }
+        match self.engine.state() {
+            RunState::Stopping => Flow::Stop,
+            _ => Flow::Continue,
+        }
+    }
+}
+
+/// Makes a file of the mesh.
+pub async fn export(engine: Rc<Engine>, id: u32, format: MeshFormat, canonical: bool) {
+    let (Some(scan), Some(volume)) = (engine.scan(), engine.volume()) else {
+        let advice = "Wait until the run has ended, or cancel it.".to_owned();
+        engine.fail("export", "There is no finished mesh yet".to_owned(), advice);
+        return;
+    };
+    let mut mesh = match volume.mesh().await {
+        Ok(mesh) => mesh,
+        Err(error) => {
+            engine.fail("export", error.to_string(), "Try again.".to_owned());
+            return;
+        }
+    };
+    let mut up = Vec3::Z;
+    if !canonical {
+        let scan_from_canonical = scan.scan_from_canonical();
+        mesh.transform(&scan_from_canonical);
+        up = scan_from_canonical.transform_vector3(DVec3::Z).as_vec3();
+    }
+    let (bytes, ending, mime) = match format {
+        MeshFormat::Glb => (mesh::glb::write(&mesh, up), "glb", "model/gltf-binary"),
+        MeshFormat::Ply => (mesh::ply::write(&mesh), "ply", "application/octet-stream"),
+        MeshFormat::Obj => (mesh::obj::write(&mesh), "obj", "model/obj"),
+    };
+    let event = Event::Exported {
+        id,
+        file_name: format!("{}.{ending}", file_stem(scan.name())),
+        mime: mime.to_owned(),
+    };
+    engine.emit_with(&event, &Uint8Array::from(bytes.as_slice()));
+}
+
+/// A picture of the view.
+pub async fn screenshot(engine: Rc<Engine>, id: u32) {
+    match picture(&engine).await {
+        Ok(bytes) => {
+            let name = engine
+                .scan()
+                .map_or("ipdrecon".to_owned(), |scan| file_stem(scan.name()));
+            let event = Event::Exported {
+                id,
+                file_name: format!("{name}.png"),
+                mime: "image/png".to_owned(),
+            };
+            engine.emit_with(&event, &bytes);
+        }
+        Err(error) => {
+            let message = format!("The picture could not be made ({error:?})");
+            engine.fail("export", message, "Try again.".to_owned());
+        }
+    }
+}
+
+async fn picture(engine: &Engine) -> Result<Uint8Array, JsValue> {
+    let canvas = engine.painted_canvas().ok_or("there is no canvas")?;
+    let options = ImageEncodeOptions::new();
+    options.set_type("image/png");
+    let blob: Promise = canvas.convert_to_blob_with_options(&options)?.into();
+    let blob: Blob = JsFuture::from(blob).await?.into();
+    let buffer: Promise = blob.array_buffer().into();
+    Ok(Uint8Array::new(&JsFuture::from(buffer).await?))
+}
+
+/// A scan's name as a file's: without its ending, and without what file systems refuse.
+fn file_stem(name: &str) -> String {
+    let stem = name.strip_suffix(".zip").unwrap_or(name);
+    let kept = stem.chars().map(|c| {
+        if c.is_alphanumeric() || "-_.".contains(c) {
+            c
+        } else {
+            '-'
+        }
+    });
+    let stem: String = kept.collect();
+    if stem.is_empty() {
+        "scan".to_owned()
+    } else {
+        stem
+    }
+}
