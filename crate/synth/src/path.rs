@@ -1,5 +1,5 @@
-//! The walk of someone who scans a room with a phone: two turns around the middle, first level across the room, then
-//! closer and looking down.
+//! The walk of someone who scans a room with a phone: two turns along the walls, looking across the room; first level
+//! and past the middle on one side, then down and past it on the other, so that things are seen from two sides.
 
 use std::f32::consts::{PI, TAU};
 
@@ -48,7 +48,7 @@ fn view(room: &Room, share: f32, camera: Camera) -> View {
     let sway = |per_turn: f32, phase: f32| libm::sinf(share * TURNS * TAU * per_turn + phase);
     let later = smooth_step((share - 0.38) / 0.24);
     let heading = share * TURNS * TAU + 0.06 * sway(3.3, 0.4);
-    let pitch = -0.18 - 0.38 * later + 0.035 * sway(2.7, 1.1);
+    let pitch = -0.18 - 0.30 * later + 0.035 * sway(2.7, 1.1);
     let roll = 0.03 * sway(1.9, 2.0);
 
     let (sin, cos) = libm::sincosf(heading);
@@ -59,10 +59,10 @@ fn view(room: &Room, share: f32, camera: Camera) -> View {
     let (tilt, upright) = libm::sincosf(roll);
     let right = right * upright + right.cross(forward) * tilt;
 
-    // Back to the wall behind for the first turn, so that much of the room is in view.
-    let half = 0.5 * room.size_m();
-    let back = Vec2::splat(1.05 - 0.5 * later + 0.08 * sway(1.4, PI));
-    let place = -Vec2::new(cos, sin) * back * half.truncate() / half.truncate().max_element();
+    let (sin, cos) = libm::sincosf(heading + later - 0.5);
+    let half = 0.5 * room.size_m().truncate();
+    let back_m = 1.5 + 0.1 * later + 0.08 * sway(1.4, PI);
+    let place = -Vec2::new(cos, sin) * back_m * half / half.max_element();
     let wanted = place.extend(1.5 - 0.1 * later + 0.03 * sway(5.0, 0.0));
     View {
         camera,

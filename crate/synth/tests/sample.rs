@@ -78,7 +78,7 @@ fn the_first_sample_covers_most_of_the_room() {
         .iter()
         .map(|view| depth(sample.room(), view))
         .collect();
-    // Of all surface that free space touches, so backs, undersides and the ceiling count as well.
+    // Of all surface that free space touches, so backs and undersides count as well: of 0.82 in reach of any eye.
     let surface = mesh::sample::surface(&sample.room().mesh(), 20_000, 1);
     let below = surface.iter().filter(|p| p.z < 2.2);
     let is_seen = |p: &&Vec3| {
@@ -93,7 +93,7 @@ fn the_first_sample_covers_most_of_the_room() {
         })
     };
     let seen = below.clone().filter(is_seen).count() as f64 / below.count() as f64;
-    assert!(seen > 0.6, "{seen} of the surface is seen");
+    assert!(seen > 0.65, "{seen} of the surface is seen");
 }
 
 #[test]
