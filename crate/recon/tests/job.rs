@@ -3,10 +3,12 @@
 mod common;
 
 use burn::tensor::Device;
-use common::{Recorder, open, sample};
-use mesh::{Mesh, protocol};
+use common::{Recorder, SEED, open, sample};
+use glam::Vec3;
+use mesh::Mesh;
 use recon::{Limits, Options, Stage};
 use scan::{MemorySource, Scan, Source};
+use synth::Room;
 
 fn run(scan: &Scan, options: Options, sink: &mut Recorder) -> recon::Outcome {
     let plan = recon::plan(scan, &Limits::default(), options).unwrap();
@@ -36,20 +38,23 @@ fn files(change: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>) -> MemorySource {
 #[test]
 fn the_sample_room_comes_out_where_it_stands() {
     let source = sample();
+    let room = Room::new(SEED);
     let (turn, shift) = source.world_from_room();
-    let mut truth = source.room().mesh();
-    for position in &mut truth.positions {
-        *position = turn * *position + shift;
-    }
     let scan = open(source);
     let mut sink = Recorder::default();
     let outcome = run(&scan, Options::default(), &mut sink);
     let mesh = mesh_in_scan_world(&scan, &outcome);
     mesh.validate().unwrap();
-    // The path does not see all of the room; what it saw must be right, in the world of the scan's own files.
-    let surface = protocol::plain(&mesh, &truth, 50_000, 1);
-    assert!(surface.precision > 0.93, "precision {}", surface.precision);
-    assert!(surface.recall > 0.5, "recall {}", surface.recall);
+    // In the world of the scan's own files, against the room's exact surface.
+    let error_m = |p: &Vec3| room.distance(turn.transpose() * (*p - shift)).abs();
+    let mut errors_m: Vec<f32> = mesh.positions.iter().map(error_m).collect();
+    errors_m.sort_by(f32::total_cmp);
+    let right = errors_m.partition_point(|&error_m| error_m < 0.05) as f32 / errors_m.len() as f32;
+    let median_m = errors_m[errors_m.len() / 2];
+    println!("{right} within 5 cm, median {median_m} m, {} m2", mesh.area());
+    assert!(right > 0.97, "{right} of the vertices lie within 5 cm");
+    assert!(median_m < 0.01, "median error {median_m} m");
+    assert!(mesh.area() > 40.0, "{} m2 of surface", mesh.area());
     let colored = mesh
         .colors
         .iter()

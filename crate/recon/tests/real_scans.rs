@@ -76,21 +76,21 @@ fn livingroom_on_the_gpu() {
     }
 }
 
-/// VoRTX's protocol runs through: render, mask, fuse again, compare. It trims what the ground truth does not show, so
-/// that a good mesh scores higher than under the plain protocol.
+/// VoRTX's protocol from end to end: render, mask, fuse again, compare. What it trims and what its second fusion adds is
+/// the same for every mesh, so the ground truth's own score under it is the most that can be had; a fusion of the same
+/// depth comes close.
 #[test]
 fn livingroom_by_the_protocol_of_vortx() {
     let Some(folder) = real("livingroom") else {
         return;
     };
+    let gt = ply::read(&std::fs::read(folder.join("gt.ply")).unwrap()).unwrap();
+    let most = score(&folder, &gt, Protocol::Vortx).surface.f_score;
     let mesh = fuse(&folder, &Device::flex());
     let report = score(&folder, &mesh, Protocol::Vortx);
-    println!("{report:?}");
-    assert!(
-        report.surface.f_score > 0.98,
-        "F {}",
-        report.surface.f_score
-    );
+    println!("the ground truth itself: F {most}; the fusion: {report:?}");
+    let found = report.surface.f_score;
+    assert!(found > most - 0.02, "F {found}, {most} can be had");
     let depth = report.depth.unwrap();
     assert!(depth.abs_rel < 0.02 && depth.delta_1 > 0.97, "{depth:?}");
 }

@@ -10,9 +10,12 @@ use std::{path::PathBuf, rc::Rc};
 use synth::SampleScan;
 use volume::{BrickMeshes, VolumeError};
 
-/// The sample room with a sensor's noise.
+/// The sample room.
+pub const SEED: u64 = 3;
+
+/// A walk through it with a sensor's noise.
 pub fn sample() -> SampleScan {
-    SampleScan::new(3, 24, 320, 240)
+    SampleScan::new(SEED, 24, 320, 240)
 }
 
 pub fn open(source: impl scan::Source + 'static) -> Scan {
