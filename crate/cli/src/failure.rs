@@ -48,7 +48,7 @@ pub enum Failure {
         /// Which file.
         path: PathBuf,
         /// What is wrong with it.
-        error: mesh::ply::PlyError,
+        error: Box<mesh::ply::PlyError>,
     },
     /// The result cannot be put into words for programs.
     #[error("the report could not be written as JSON: {0}")]

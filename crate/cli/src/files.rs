@@ -20,7 +20,7 @@ pub fn read_mesh(path: &Path) -> Result<Mesh, Failure> {
     let bytes = fs::read(path).map_err(|error| failed("read", path, error))?;
     ply::read(&bytes).map_err(|error| Failure::Ply {
         path: path.to_owned(),
-        error,
+        error: Box::new(error),
     })
 }
 

@@ -1,5 +1,8 @@
 //! The command line as its user meets it: files in, files and figures out, and plain words when something is wrong.
 
+// A test that cannot go on may say so by a panic.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
 use scan::Source;
 use std::{
     fs,
@@ -58,12 +61,23 @@ fn fuse_writes_every_format_and_eval_finds_them_equal() {
         assert!(fs::metadata(&out).unwrap().len() > 20_000);
         // A pipe gets neither bars nor anything else on standard output.
         assert!(run.stdout.is_empty());
-        assert!(!text(&run.stderr).contains('\r'), "a progress bar in a pipe");
+        assert!(
+            !text(&run.stderr).contains('\r'),
+            "a progress bar in a pipe"
+        );
     }
     let ply = sample.file("room.ply");
     for protocol in ["plain", "transformerfusion", "vortx"] {
         let run = ipdrecon(&[
-            "eval", "--pred", str(&ply), "--gt", str(&ply), "--scan", str(&sample.scan()), "--protocol", protocol,
+            "eval",
+            "--pred",
+            str(&ply),
+            "--gt",
+            str(&ply),
+            "--scan",
+            str(&sample.scan()),
+            "--protocol",
+            protocol,
             "--json",
         ]);
         let report: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
@@ -94,7 +108,10 @@ fn the_mesh_lies_in_the_scans_world_unless_canonical_is_asked_for() {
     // Canonical is Z up: the room is lower than wide. The sample's own world is its first camera's.
     let size = canonical.bounds().unwrap().size();
     assert!(size.z < size.x.max(size.y), "{size}");
-    let scan = scan::open(std::rc::Rc::new(scan::FolderSource::open(&sample.scan()).unwrap())).unwrap();
+    let scan = scan::open(std::rc::Rc::new(
+        scan::FolderSource::open(&sample.scan()).unwrap(),
+    ))
+    .unwrap();
     let mut turned = canonical.clone();
     turned.transform(&scan.scan_from_canonical());
     for (a, b) in turned.positions.iter().zip(&own.positions) {
@@ -106,16 +123,33 @@ fn the_mesh_lies_in_the_scans_world_unless_canonical_is_asked_for() {
 #[test]
 fn doctor_reports_in_words_and_in_json() {
     let sample = Sample::write();
-    fs::write(sample.scan().join("frame-000003.pose.txt"), "1 0 0 nan\n0 1 0 0\n0 0 1 0\n0 0 0 1\n").unwrap();
+    fs::write(
+        sample.scan().join("frame-000003.pose.txt"),
+        "1 0 0 nan\n0 1 0 0\n0 0 1 0\n0 0 0 1\n",
+    )
+    .unwrap();
     let run = ipdrecon(&["doctor", str(&sample.scan())]);
-    assert!(text(&run.stdout).contains("7-Scenes") || text(&run.stdout).contains("SevenScenes"), "{}", text(&run.stdout));
+    assert!(
+        text(&run.stdout).contains("7-Scenes") || text(&run.stdout).contains("SevenScenes"),
+        "{}",
+        text(&run.stdout)
+    );
     let words = text(&run.stderr);
-    assert!(words.contains("frame-000003.pose.txt:1") && words.contains("expected") && words.contains("found"), "{words}");
+    assert!(
+        words.contains("frame-000003.pose.txt:1")
+            && words.contains("expected")
+            && words.contains("found"),
+        "{words}"
+    );
     let run = ipdrecon(&["doctor", str(&sample.scan()), "--json"]);
     let report: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
     assert_eq!(report["frames"], 9);
     let findings = report["findings"].as_array().unwrap();
-    assert!(findings.iter().any(|f| f["line"] == 1 && f["file"].as_str().unwrap().contains("000003")));
+    assert!(
+        findings
+            .iter()
+            .any(|f| f["line"] == 1 && f["file"].as_str().unwrap().contains("000003"))
+    );
 }
 
 #[test]
@@ -130,21 +164,64 @@ fn what_cannot_be_done_is_said_in_one_line() {
     let no_ply = sample.file("no.ply");
     fs::write(&no_ply, "solid cube").unwrap();
     let cases: [(&[&str], &[&str]); 7] = [
-        (&["fuse", str(&scan), "-o", "room.stl"], &[".ply, .glb or .obj", "room.stl"]),
-        (&["fuse", "nowhere", "-o", str(&out)], &["nowhere", "expected a folder"]),
-        (&["fuse", str(&empty), "-o", str(&out)], &["expected", "found"]),
-        (&["fuse", str(&no_zip), "-o", str(&out)], &["expected a zip archive"]),
-        (&["fuse", str(&scan), "-o", str(&out), "--voxel", "0"], &["voxel size between", "0 m"]),
-        (&["eval", "--pred", str(&no_ply), "--gt", str(&no_ply), "--protocol", "plain"], &["no.ply", "expected"]),
-        (&["eval", "--pred", "missing.ply", "--gt", "missing.ply", "--protocol", "plain"], &["missing.ply", "read"]),
+        (
+            &["fuse", str(&scan), "-o", "room.stl"],
+            &[".ply, .glb or .obj", "room.stl"],
+        ),
+        (
+            &["fuse", "nowhere", "-o", str(&out)],
+            &["nowhere", "expected a folder"],
+        ),
+        (
+            &["fuse", str(&empty), "-o", str(&out)],
+            &["expected", "found"],
+        ),
+        (
+            &["fuse", str(&no_zip), "-o", str(&out)],
+            &["expected a zip archive"],
+        ),
+        (
+            &["fuse", str(&scan), "-o", str(&out), "--voxel", "0"],
+            &["voxel size between", "0 m"],
+        ),
+        (
+            &[
+                "eval",
+                "--pred",
+                str(&no_ply),
+                "--gt",
+                str(&no_ply),
+                "--protocol",
+                "plain",
+            ],
+            &["no.ply", "expected"],
+        ),
+        (
+            &[
+                "eval",
+                "--pred",
+                "missing.ply",
+                "--gt",
+                "missing.ply",
+                "--protocol",
+                "plain",
+            ],
+            &["missing.ply", "read"],
+        ),
     ];
     for (arguments, words) in cases {
         let run = ipdrecon(arguments);
         let said = text(&run.stderr);
         assert!(!run.status.success(), "{arguments:?} succeeded");
-        assert!(said.starts_with("error: ") && !said.contains("panicked"), "{arguments:?}: {said}");
+        assert!(
+            said.starts_with("error: ") && !said.contains("panicked"),
+            "{arguments:?}: {said}"
+        );
         for word in words {
-            assert!(said.contains(word), "{arguments:?}: expected \"{word}\" in: {said}");
+            assert!(
+                said.contains(word),
+                "{arguments:?}: expected \"{word}\" in: {said}"
+            );
         }
     }
     assert!(!out.exists(), "nothing is written when something is wrong");

@@ -1,11 +1,9 @@
-//! A mesh seen by a camera, on the CPU: depth for the metrics, and pictures where there is no GPU.
+//! A mesh seen by a camera, on the CPU: depth for the metrics.
 
 mod depth;
-mod scene;
-mod shaded;
+mod front;
 
 pub use depth::depth;
-pub use shaded::{Style, shaded};
 
 /// Which sides of a triangle are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

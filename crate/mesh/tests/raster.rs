@@ -2,7 +2,7 @@
 
 use glam::{Affine3A, Quat, Vec2, Vec3};
 use mesh::camera::Pinhole;
-use mesh::raster::{Cull, Style, depth, shaded};
+use mesh::raster::{Cull, depth};
 use mesh::{Mesh, sample::Uniform};
 
 const CAMERA: Pinhole = Pinhole {
@@ -13,7 +13,6 @@ const CAMERA: Pinhole = Pinhole {
     cx: 31.3,
     cy: 23.8,
 };
-const BACKGROUND: [u8; 4] = [9, 8, 7, 6];
 
 /// A quadrilateral from its corners, counter-clockwise.
 fn quad(corners: [[f32; 3]; 4]) -> Mesh {
@@ -180,104 +179,4 @@ fn corners_on_pixel_centres_belong_to_exactly_one_neighbour() {
     assert_eq!((left.len(), right.len()), (4 * 6, 6 * 6));
     assert!(left.iter().all(|pixel| !right.contains(pixel)));
     assert!(left.contains(&(2 * 12 + 1)), "the top left corner is in");
-}
-
-fn picture(mesh: &Mesh, style: Style) -> Vec<[u8; 4]> {
-    let bytes = shaded(mesh, &CAMERA, &Affine3A::IDENTITY, style, BACKGROUND);
-    bytes.as_chunks().0.to_vec()
-}
-
-/// The pixel at (column, row).
-fn at(picture: &[[u8; 4]], column: usize, row: usize) -> [u8; 4] {
-    picture[row * CAMERA.width as usize + column]
-}
-
-#[test]
-fn colours_are_blended_and_lit_from_the_camera() {
-    let mut mesh = wall(2.5);
-    mesh.colors = vec![[255, 0, 0], [255, 0, 0], [0, 0, 255], [0, 0, 255]];
-    let lit = picture(&mesh, Style::Color);
-    assert_eq!(at(&lit, 0, 0), BACKGROUND);
-    let [left, middle, right] = [9, 31, 54].map(|column| at(&lit, column, 24));
-    assert!(left[0] > 200 && left[2] < 20, "{left:?}");
-    assert!(right[2] > 200 && right[0] < 20, "{right:?}");
-    assert!(
-        middle[0].abs_diff(128) < 6 && middle[2].abs_diff(128) < 6,
-        "{middle:?}"
-    );
-    assert_eq!(middle[3], 255);
-
-    mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
-    let from_behind = at(&picture(&mesh, Style::Color), 9, 24);
-    assert!(from_behind[0] < left[0] / 3 * 2, "{from_behind:?}");
-}
-
-#[test]
-fn without_colours_the_surface_is_grey_and_darker_where_it_turns_away() {
-    let facing = at(&picture(&wall(2.5), Style::Color), 31, 24);
-    assert!(facing[0] > 190 && facing[0] == facing[1] && facing[1] == facing[2]);
-    let slanted = quad([
-        [-1.0, -1.0, 0.5],
-        [-1.0, 1.0, 0.5],
-        [1.0, 1.0, 4.5],
-        [1.0, -1.0, 4.5],
-    ]);
-    let turned_away = at(&picture(&slanted, Style::Color), 31, 24);
-    assert!(turned_away[0] < facing[0] - 30, "{turned_away:?}");
-}
-
-#[test]
-fn normals_come_from_the_vertices_or_else_from_the_triangle() {
-    let mut mesh = wall(2.5);
-    let flat = at(&picture(&mesh, Style::Normal), 31, 24);
-    assert_eq!(flat, [128, 128, 0, 255], "towards the camera is -z");
-    mesh.normals = vec![Vec3::X; 4];
-    assert_eq!(
-        at(&picture(&mesh, Style::Normal), 31, 24),
-        [255, 128, 128, 255]
-    );
-}
-
-#[test]
-fn depth_style_runs_from_near_to_far() {
-    let slanted = quad([
-        [-2.0, -1.0, 1.0],
-        [-2.0, 1.0, 1.0],
-        [2.0, 1.0, 4.0],
-        [2.0, -1.0, 4.0],
-    ]);
-    let map = picture(&slanted, Style::Depth);
-    let row: Vec<[u8; 4]> = (0..64).map(|column| at(&map, column, 24)).collect();
-    let drawn: Vec<_> = row
-        .into_iter()
-        .filter(|&pixel| pixel != BACKGROUND)
-        .collect();
-    let (near, far) = (drawn[0], drawn[drawn.len() - 1]);
-    assert!(near[0] > 240 && near[1] > 215, "near is yellow: {near:?}");
-    assert!(
-        far[0] < 80 && far[1] < 30 && far[2] > 70,
-        "far is violet: {far:?}"
-    );
-}
-
-#[test]
-fn wireframe_draws_the_edges_and_only_them() {
-    let lines = picture(&wall(2.5), Style::Wireframe);
-    // The diagonal runs from the top left to the bottom right corner; the wall is 48 x 46.4 pixels.
-    let on_diagonal = at(&lines, 31, 24)[0].min(at(&lines, 32, 24)[0]);
-    let beside = at(&lines, 20, 35)[0];
-    assert!(on_diagonal < 100 && beside > 180, "{on_diagonal} {beside}");
-    let dark = lines
-        .iter()
-        .filter(|pixel| pixel[3] == 255 && pixel[0] < 100)
-        .count();
-    assert!((80..400).contains(&dark), "{dark} dark pixels");
-}
-
-#[test]
-fn wireframe_of_tiny_triangles_stays_legible() {
-    // About one pixel each: full lines would leave nothing but black.
-    let lines = picture(&sheet(0.3, 1), Style::Wireframe);
-    let mean = lines.iter().map(|pixel| f32::from(pixel[0])).sum::<f32>() / lines.len() as f32;
-    assert!(mean > 100.0, "{mean}");
 }

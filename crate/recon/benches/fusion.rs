@@ -3,6 +3,9 @@
 //! On the sample room, and on a real scan where one lies beside the repository. On a machine without a GPU the wgpu
 //! device is a processor that plays one: the ratios then say nothing about a GPU.
 
+// A test that cannot go on may say so by a panic.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
 #[path = "../tests/common/mod.rs"]
 mod common;
 

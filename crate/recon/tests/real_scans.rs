@@ -2,6 +2,9 @@
 //!
 //! They lie beside the repository and are not part of it; without them these tests say that they are skipped.
 
+// A test that cannot go on may say so by a panic.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
 mod common;
 
 use burn::tensor::Device;

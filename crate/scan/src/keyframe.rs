@@ -1,6 +1,6 @@
 //! Which frames are worth the work: neighbours that see almost the same are skipped.
 
-use crate::scan::Frame;
+use crate::frame::Frame;
 
 /// A frame is kept when it moved or turned more than this since the last kept one.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,42 +2,16 @@
 
 use std::rc::Rc;
 
-use glam::{DAffine3, DMat3, DVec3};
-use serde::Serialize;
+use glam::{DAffine3, DMat3};
 
 use crate::camera::Camera;
 use crate::error::{FrameError, ScanError};
 use crate::finding::{Finding, FindingLog, Severity};
 use crate::format::{self, Format, Recognised};
+use crate::frame::{Frame, ImageRef};
 use crate::gravity::{self, Gravity};
 use crate::image::{self, ColorImage, DecodeFault, DepthCode, DepthImage};
 use crate::source::Source;
-
-/// A picture that has not been read yet.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct ImageRef {
-    /// Path inside the source.
-    pub path: String,
-}
-
-/// One posed frame; its pictures are decoded by [`Scan::color`] and [`Scan::depth`].
-#[derive(Debug, Clone)]
-pub struct Frame {
-    /// The frame's name in the scan, such as `frame-000012`.
-    pub name: String,
-    /// Canonical world from camera: OpenCV camera axes, metres, world Z up.
-    pub pose: DAffine3,
-    /// Its colour picture, if any.
-    pub color: Option<ImageRef>,
-    /// Its depth picture, if any.
-    pub depth: Option<ImageRef>,
-    /// The camera of the colour picture.
-    pub color_camera: Camera,
-    /// The camera of the depth picture.
-    pub depth_camera: Camera,
-    /// Seconds, where the format has times.
-    pub timestamp_s: Option<f64>,
-}
 
 /// A recognised scan: poses and cameras of every usable frame in memory, pictures in the source.
 pub struct Scan {
@@ -227,10 +201,4 @@ fn check_size(path: &str, (width, height): (u32, u32), camera: &Camera) -> Resul
             .found(format!("{width}x{height}"))
             .advice("The picture is left out; export it in the size of the others"),
     )))
-}
-
-/// Mean image-up direction of cameras, of length at most 1.
-pub(crate) fn mean_camera_up(frames: &[Frame]) -> DVec3 {
-    let sum: DVec3 = frames.iter().map(|frame| -frame.pose.matrix3.y_axis).sum();
-    sum / frames.len().max(1) as f64
 }

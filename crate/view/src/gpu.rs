@@ -4,6 +4,8 @@ mod frame;
 mod painter;
 mod pick;
 mod pipelines;
+mod scene;
 
-pub use painter::{GpuPainter, Scene};
+pub use painter::GpuPainter;
 pub use pick::Picking;
+pub use scene::Scene;

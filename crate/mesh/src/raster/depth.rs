@@ -1,6 +1,6 @@
 //! Depth maps of a mesh, as the metrics compare them.
 
-use super::{Cull, scene};
+use super::{Cull, front};
 use crate::Mesh;
 use crate::camera::Pinhole;
 use glam::Affine3A;
@@ -14,7 +14,7 @@ pub fn depth(
     cull: Cull,
     near_m: f32,
 ) -> Vec<f32> {
-    let mut map = scene::draw(mesh, camera, camera_from_world, cull, near_m).inverse_depth;
+    let mut map = front::draw(mesh, camera, camera_from_world, cull, near_m);
     for value in &mut map {
         *value = if *value > 0.0 { 1.0 / *value } else { 0.0 };
     }

@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use crate::finding::{Finding, FindingLog, Severity};
+use crate::frame::{Frame, mean_camera_up};
 use crate::gravity::Gravity;
-use crate::scan::{Frame, mean_camera_up};
 
 use super::median;
 

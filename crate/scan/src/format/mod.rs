@@ -16,8 +16,8 @@ use serde::Serialize;
 
 use crate::error::ScanError;
 use crate::finding::{Finding, FindingLog, Severity};
+use crate::frame::Frame;
 use crate::image::DepthCode;
-use crate::scan::Frame;
 use crate::source::Source;
 
 use self::folder::{Folder, Listing};

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use crate::camera::Camera;
 use crate::error::ScanError;
 use crate::finding::{Finding, FindingLog, Severity};
+use crate::frame::{Frame, ImageRef};
 use crate::pose;
-use crate::scan::{Frame, ImageRef};
 
 use super::folder::Folder;
 

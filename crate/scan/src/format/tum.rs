@@ -13,8 +13,8 @@ use glam::{DAffine3, DMat3, DVec3};
 use crate::camera::Camera;
 use crate::error::ScanError;
 use crate::finding::{Finding, FindingLog, Severity};
+use crate::frame::{Frame, ImageRef};
 use crate::image::DepthCode;
-use crate::scan::{Frame, ImageRef};
 
 use super::folder::Folder;
 use super::intrinsics::{self, Intrinsics};

@@ -10,8 +10,8 @@ use glam::{DMat3, DQuat, DVec3};
 use serde::Serialize;
 
 use crate::finding::{Finding, FindingLog, Severity};
+use crate::frame::{Frame, mean_camera_up};
 use crate::image::DepthImage;
-use crate::scan::{Frame, mean_camera_up};
 
 /// How the up direction is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

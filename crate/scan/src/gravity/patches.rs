@@ -4,8 +4,8 @@ use std::collections::HashSet;
 
 use glam::{DMat3, DVec2, DVec3};
 
+use crate::frame::Frame;
 use crate::image::DepthImage;
-use crate::scan::Frame;
 
 /// A flat piece of a surface, in the frames' world.
 #[derive(Debug, Clone, Copy)]

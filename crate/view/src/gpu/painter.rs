@@ -3,21 +3,11 @@
 use super::frame::{Frame, clear_color};
 use super::pick::{Picker, Picking};
 use super::pipelines::{DEPTH_FORMAT, Pipelines};
-use crate::lines::{self, Frusta, Line};
-use crate::look::{Look, Viewport};
-use crate::{Arena, OrbitCamera};
+use super::scene::Scene;
+use crate::OrbitCamera;
+use crate::lines::{self, Line};
+use crate::look::Viewport;
 use glam::Vec2;
-
-/// What is in the picture.
-#[derive(Clone, Copy)]
-pub struct Scene<'a> {
-    /// The surface.
-    pub arena: &'a Arena,
-    /// The photos' cameras.
-    pub frusta: &'a Frusta,
-    /// How it looks.
-    pub look: &'a Look,
-}
 
 /// The textures drawn into before the target, by size.
 struct Attachments {

@@ -5,8 +5,8 @@
 //! the walls that are left out left out.
 
 use super::frame::Frame;
-use super::painter::Scene;
 use super::pipelines::{DEPTH_FORMAT, PICK_FORMAT, Pipelines};
+use super::scene::Scene;
 use crate::look::Viewport;
 use crate::{OrbitCamera, Ray};
 use glam::{Mat4, Vec2, Vec3, Vec4};

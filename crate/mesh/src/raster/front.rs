@@ -1,4 +1,4 @@
-//! Which triangle is in front at each pixel: the one rasteriser behind depth maps and pictures.
+//! What is in front at each pixel: the rasteriser behind depth maps.
 //!
 //! Corners are snapped to 1/256 pixel and edges are tested in whole numbers with the top-left rule, so that triangles
 //! sharing an edge leave no gap between them and no pixel is drawn twice. Inverse depth is linear on the screen, which
@@ -13,19 +13,6 @@ use glam::{Affine3A, Vec3, Vec3A};
 const SUBPIXEL: f32 = 256.0;
 /// Corners further than this many pixels from the picture's origin are moved there, so that products fit 64 bits.
 const FAR_AWAY: f32 = 2_097_152.0;
-/// Marks pixels without a triangle.
-pub(super) const EMPTY: u32 = u32::MAX;
-
-/// The picture before shading. Arrays are row-major.
-pub(super) struct Scene {
-    /// 1 / z of the nearest surface, 0 where there is none.
-    pub(super) inverse_depth: Vec<f32>,
-    /// The triangle there, or [`EMPTY`].
-    pub(super) triangle: Vec<u32>,
-    /// Vertices in camera coordinates.
-    pub(super) points: Vec<Vec3A>,
-}
-
 /// A corner on the screen: position in 1/256 pixel and inverse depth.
 #[derive(Clone, Copy)]
 struct Corner {
@@ -34,14 +21,15 @@ struct Corner {
     inverse_depth: f32,
 }
 
-/// Draws all triangles of a valid mesh that are at least partly beyond `near_m`.
+/// 1 / z of the nearest surface at each pixel, row-major, 0 where there is none: of all triangles of a valid mesh that are
+/// at least partly beyond `near_m`.
 pub(super) fn draw(
     mesh: &Mesh,
     camera: &Pinhole,
     camera_from_world: &Affine3A,
     cull: Cull,
     near_m: f32,
-) -> Scene {
+) -> Vec<f32> {
     let near_m = near_m.max(1e-6);
     let transform = |&p: &Vec3| camera_from_world.transform_point3a(p.into());
     let points: Vec<Vec3A> = mesh.positions.iter().map(transform).collect();
@@ -52,28 +40,23 @@ pub(super) fn draw(
         mirrored: camera.fx * camera.fy < 0.0,
         cull,
         inverse_depth: vec![0.0; camera.pixels()],
-        triangle: vec![EMPTY; camera.pixels()],
     };
-    for (id, triangle) in mesh.triangles.iter().enumerate() {
+    for triangle in &mesh.triangles {
         let at = triangle.map(|index| index as usize);
         let beyond = at.map(|index| points[index].z >= near_m);
         match beyond {
             [false, false, false] => (),
-            [true, true, true] => canvas.fill(id as u32, at.map(|index| corners[index])),
+            [true, true, true] => canvas.fill(at.map(|index| corners[index])),
             _ => {
                 let polygon = clip(at.map(|index| points[index]), near_m);
                 let polygon: Vec<Corner> = polygon.map(|p| corner(camera, p)).collect();
                 for pair in polygon[1..].windows(2) {
-                    canvas.fill(id as u32, [polygon[0], pair[0], pair[1]]);
+                    canvas.fill([polygon[0], pair[0], pair[1]]);
                 }
             }
         }
     }
-    Scene {
-        inverse_depth: canvas.inverse_depth,
-        triangle: canvas.triangle,
-        points,
-    }
+    canvas.inverse_depth
 }
 
 fn corner(camera: &Pinhole, point: Vec3A) -> Corner {
@@ -105,11 +88,10 @@ struct Canvas {
     mirrored: bool,
     cull: Cull,
     inverse_depth: Vec<f32>,
-    triangle: Vec<u32>,
 }
 
 impl Canvas {
-    fn fill(&mut self, id: u32, [a, b, c]: [Corner; 3]) {
+    fn fill(&mut self, [a, b, c]: [Corner; 3]) {
         let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
         if area == 0 {
             return;
@@ -156,7 +138,6 @@ impl Canvas {
                     let inverse_depth = (from + weight_b * slope_b + weight_c * slope_c) as f32;
                     if inverse_depth > self.inverse_depth[pixel] {
                         self.inverse_depth[pixel] = inverse_depth;
-                        self.triangle[pixel] = id;
                     }
                 }
                 for (value, edge) in value.iter_mut().zip(&edges) {
