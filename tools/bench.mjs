@@ -7,7 +7,7 @@ import { must, root } from './run.mjs';
 import { setup } from './setup.mjs';
 
 if (!(await setup('test'))) process.exit(1);
-const { output } = await must('cargo', ['bench', '--quiet', '--workspace', '--bench', 'fusion'], { env: gpu(buildEnv()) });
+const output = await must('cargo', ['bench', '--quiet', '--workspace', '--bench', 'fusion'], { env: gpu(buildEnv()) });
 const table = output.split('\n').filter((line) => line.startsWith('|') || line.startsWith('medians')).join('\n').replace('\nmedians', '\n\nmedians');
 const machine = `${cpus().length} cores of ${cpus()[0]?.model ?? 'an unknown processor'}`;
 const text = `# Benchmarks
@@ -17,7 +17,8 @@ Written by \`npm run bench\`. Machines differ and are shared: compare the rows o
 ## Fusion: \`flex\` (the CPU device) against wgpu, natively
 
 ${machine}. Where there is no GPU, wgpu is Mesa's lavapipe, a processor that plays one: the ratios then say nothing about a GPU.
-A frame is decoded, its bricks are chosen and its depth is integrated; a brick is classified, placed and its triangles are made.
+A frame is decoded (the sample room's is drawn while it is read), its bricks are chosen and its depth is integrated; a brick is
+classified, placed and its triangles are made.
 
 ${table}
 `;

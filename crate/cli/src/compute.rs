@@ -3,6 +3,10 @@
 use crate::failure::Failure;
 use burn::tensor::Device;
 use clap::ValueEnum;
+use recon::Limits;
+
+/// Main memory has no such bound as a GPU's binding; the volume's indices are whole numbers of 32 bits.
+const CPU_BINDING_BYTES: usize = 2 << 30;
 
 /// Where to compute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -14,13 +18,24 @@ pub enum DeviceChoice {
 }
 
 impl DeviceChoice {
-    /// burn's device.
-    pub fn device(self) -> Result<Device, Failure> {
+    /// burn's device, and what it allows.
+    pub fn device(self) -> Result<(Device, Limits), Failure> {
         match self {
-            Self::Cpu => Ok(Device::flex()),
-            Self::Gpu => Device::wgpu_options()
-                .init()
-                .map_err(|error| Failure::Gpu(error.to_string())),
+            Self::Cpu => Ok((
+                Device::flex(),
+                Limits {
+                    binding_bytes: CPU_BINDING_BYTES,
+                },
+            )),
+            Self::Gpu => {
+                let found = Device::wgpu_options().init_with_setup();
+                let (device, setup) = found.map_err(|error| Failure::Gpu(error.to_string()))?;
+                let bytes = setup.device.limits().max_storage_buffer_binding_size;
+                let limits = Limits {
+                    binding_bytes: usize::try_from(bytes).unwrap_or(usize::MAX),
+                };
+                Ok((device, limits))
+            }
         }
     }
 }

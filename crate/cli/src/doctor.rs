@@ -35,7 +35,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn print(report: &Report) {
-    println!("{} ({:?})", report.name, report.format);
+    println!("{} ({})", report.name, report.format);
     println!(
         "frames       {} ({} with colour, {} with depth), {} keyframes",
         report.frames, report.color_frames, report.depth_frames, report.keyframes

@@ -8,7 +8,7 @@ use crate::{
 };
 use clap::Args;
 use glam::Vec3;
-use recon::{Limits, Options, Plan};
+use recon::{Options, Plan};
 use std::{path::PathBuf, time::Instant};
 
 /// What `fuse` is told.
@@ -47,9 +47,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         every: arguments.every,
         max_depth_m: arguments.max_depth,
     };
-    let plan = recon::plan(&scan, &Limits::default(), options)?;
+    let (device, limits) = arguments.device.device()?;
+    let plan = recon::plan(&scan, &limits, options)?;
     print_plan(&plan);
-    let device = arguments.device.device()?;
     let mut terminal = Terminal::new();
     let outcome = pollster::block_on(recon::run(&scan, &plan, &device, &mut terminal));
     terminal.finish();

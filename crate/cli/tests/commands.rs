@@ -130,7 +130,7 @@ fn doctor_reports_in_words_and_in_json() {
     .unwrap();
     let run = ipdrecon(&["doctor", str(&sample.scan())]);
     assert!(
-        text(&run.stdout).contains("7-Scenes") || text(&run.stdout).contains("SevenScenes"),
+        text(&run.stdout).contains("(7-Scenes)"),
         "{}",
         text(&run.stdout)
     );

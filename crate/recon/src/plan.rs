@@ -115,28 +115,39 @@ pub fn plan(scan: &Scan, limits: &Limits, options: Options) -> Result<Plan, Plan
         .filter(|&frame| frames[frame].depth.is_some());
     let keyframes: Vec<usize> = kept.step_by(options.every).collect();
 
-    let mut remarks = Vec::new();
     let samples = sample_depths(scan, &keyframes);
-    let mut options = options;
-    let (volume, bricks) = loop {
+    let laid_out = |voxel_size_m: f32| {
         let volume = VolumeConfig {
             max_depth_m: options.max_depth_m,
             color: scan.has_color(),
             binding_bytes: limits.binding_bytes,
-            ..VolumeConfig::new(options.voxel_size_m)
+            ..VolumeConfig::new(voxel_size_m)
         };
         let bricks = estimate(scan, &volume, &samples, keyframes.len());
-        if (bricks as f64) < volume.brick_limit() as f64 * MARGIN {
-            break (volume, bricks);
-        }
-        let asked = options.voxel_size_m;
-        options.voxel_size_m = asked * COARSER;
+        (volume, bricks)
+    };
+    let fits = |(volume, bricks): &(VolumeConfig, usize)| {
+        (*bricks as f64) < volume.brick_limit() as f64 * MARGIN
+    };
+    let asked = laid_out(options.voxel_size_m);
+    let mut chosen = asked;
+    while !fits(&chosen) {
+        chosen = laid_out(chosen.0.voxel_size_m * COARSER);
+    }
+    let (volume, bricks) = chosen;
+    let mut remarks = Vec::new();
+    if volume != asked.0 {
         remarks.push(format!(
-            "voxels of {:.1} cm would need about {bricks} bricks, this device holds {}: voxels of {:.1} cm are used",
-            asked * 100.0,
-            volume.brick_limit(),
+            "voxels of {:.1} cm would need about {} bricks, more than this device surely holds (of {}): voxels of {:.1} cm are used",
             options.voxel_size_m * 100.0,
+            asked.1,
+            volume.brick_limit(),
+            volume.voxel_size_m * 100.0,
         ));
+    }
+    let options = Options {
+        voxel_size_m: volume.voxel_size_m,
+        ..options
     };
     let picture_bytes = keyframes
         .iter()
