@@ -322,9 +322,9 @@ async fn picture(engine: &Engine) -> Result<Uint8Array, JsValue> {
     let canvas = engine.painted_canvas().ok_or("there is no canvas")?;
     let options = ImageEncodeOptions::new();
     options.set_type("image/png");
-    let blob: Promise = canvas.convert_to_blob_with_options(&options)?.into();
+    let blob: Promise = canvas.convert_to_blob_with_options(&options)?;
     let blob: Blob = JsFuture::from(blob).await?.into();
-    let buffer: Promise = blob.array_buffer().into();
+    let buffer = blob.array_buffer();
     Ok(Uint8Array::new(&JsFuture::from(buffer).await?))
 }
 
