@@ -60,6 +60,7 @@ test('an engine that cannot be loaded is one sentence, a report and a way back',
   });
   const { page } = visitor;
   const failed = await visitor.event('failed');
+  await visitor.until('failed');
   assert.equal(failed.code, 'internal');
   assert.equal(await page.locator('#panel-title').innerText(), failed.message);
   assert.match(failed.message, /could not be loaded/);

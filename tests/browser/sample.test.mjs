@@ -2,6 +2,7 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { after, before, test } from 'node:test';
+import validator from 'gltf-validator';
 import { visit } from './launch.mjs';
 
 let browser;
@@ -31,6 +32,10 @@ test('the sample becomes a mesh that can be looked at and saved', async () => {
   const glb = readFileSync(await (await visitor.download('[data-format=glb]')).path());
   assert.equal(glb.toString('latin1', 0, 4), 'glTF');
   assert.equal(glb.readUInt32LE(8), glb.length, 'the length that the GLB states');
+  const { issues } = await validator.validateBytes(new Uint8Array(glb));
+  assert.deepEqual([issues.numErrors, issues.numWarnings], [0, 0], JSON.stringify(issues.messages));
+  const { meshes } = JSON.parse(glb.toString('utf8', 20, 20 + glb.readUInt32LE(12)));
+  assert.ok('COLOR_0' in meshes[0].primitives[0].attributes, 'vertex colours are kept');
   const ply = readFileSync(await (await visitor.download('[data-format=ply]')).path());
   assert.equal(Number(/element face (\d+)/.exec(ply.toString('latin1', 0, 2000))?.[1]), finished.triangles);
   const obj = readFileSync(await (await visitor.download('[data-format=obj]')).path(), 'utf8');

@@ -5,17 +5,28 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { root } from '../../tools/run.mjs';
+import { chamfer, vertices } from './chamfer.mjs';
+import { build, fuse, judge } from './command-line.mjs';
 import { pictures, visit } from './launch.mjs';
 
 const out = mkdtempSync(join(tmpdir(), 'ipdrecon-'));
 let browser;
 before(async () => {
   browser = await visit();
+  await build();
 });
 after(async () => {
   rmSync(out, { recursive: true });
   await browser.close();
 });
+
+/** F at 5 cm that an independent fusion of the same keyframes reaches, less a hair; and how much browser and command line may differ. */
+const least = {
+  hololens: { plain: 0.95, transformerfusion: 0.97 },
+  livingroom: { plain: 0.983, transformerfusion: 0.985 },
+};
+const F_SLACK = 0.005;
+const CHAMFER_M = 0.001;
 
 const scans = [
   // A true drop for the one, the folder button's input for the other.
@@ -57,5 +68,19 @@ for (const { name, frames, limit_s, open } of scans) {
     const header = readFileSync(ply).toString('latin1', 0, 2000);
     assert.equal(Number(/element face (\d+)/.exec(header)?.[1]), finished.triangles);
     await visitor.close();
+
+    const own = join(out, `${name}-command-line.ply`);
+    await fuse(path, own);
+    const apart = chamfer(vertices(readFileSync(ply)), vertices(readFileSync(own)));
+    t.diagnostic(`${name}: chamfer between browser and command line ${(apart * 1000).toFixed(4)} mm`);
+    assert.ok(apart <= CHAMFER_M, `chamfer ${apart} m`);
+    for (const [protocol, f] of Object.entries(least[name])) {
+      const truth = join(path, '../gt.ply');
+      const [page, line] = await Promise.all([ply, own].map((mesh) => judge(mesh, truth, protocol, path)));
+      const [found, expected] = [page, line].map(({ surface }) => surface.f_score);
+      t.diagnostic(`${name}, ${protocol}: F ${found.toFixed(4)} in the browser, ${expected.toFixed(4)} on the command line`);
+      assert.ok(found >= f, `${protocol}: F ${found}, at least ${f} expected`);
+      assert.ok(Math.abs(found - expected) <= F_SLACK, `${protocol}: F ${found} and ${expected}`);
+    }
   });
 }

@@ -1,12 +1,10 @@
-//! The engine as the worker script holds it: requests are handed to tasks, and the tasks share what is here.
+//! What the engine's tasks share: the device, the stage, the scan, its plan and volume, and where a run stands.
 
 use crate::{
-    convert,
-    files::{DroppedFolder, DroppedZip},
-    job::{self, Origin},
-    messages::{DeviceChoice, Event, InputEvent, LookAt, Request},
+    convert, handoff,
+    messages::{DeviceChoice, Event, InputEvent, LookAt, ViewOptions},
     platform,
-    stage::{Gpu, Stage},
+    stage::{Bricks, Gpu, Stage},
 };
 use burn::tensor::{Device, wgpu::WgpuSetup};
 use glam::{Vec2, Vec3};
@@ -17,12 +15,11 @@ use std::{
     cell::{Cell, RefCell},
     rc::Rc,
 };
-use tsify::{Ts, Tsify};
+use tsify::Tsify;
 use view::CameraPose;
 use volume::{BrickMeshes, Volume, VolumeError};
-use wasm_bindgen::{JsValue, prelude::wasm_bindgen};
-use wasm_bindgen_futures::spawn_local;
-use web_sys::{File, OffscreenCanvas};
+use wasm_bindgen::JsValue;
+use web_sys::OffscreenCanvas;
 
 /// The largest binding that is used even where more is allowed.
 const BINDING_BYTES: u64 = 1 << 30;
@@ -57,94 +54,9 @@ pub struct Engine {
     touched: Cell<bool>,
 }
 
-/// The engine's handle for the worker script.
-#[wasm_bindgen(js_name = Engine)]
-pub struct Handle(Rc<Engine>);
-
-#[wasm_bindgen(js_class = Engine)]
-impl Handle {
-    /// Finds a device and starts the engine on it. `emit` is called with every event, and with the bytes beside it.
-    ///
-    /// # Errors
-    /// When neither WebGPU nor the CPU can be used, or `request` is not `start`.
-    pub async fn start(
-        canvas: Option<OffscreenCanvas>,
-        request: Ts<Request>,
-        emit: Function,
-    ) -> Result<Handle, JsValue> {
-        console_error_panic_hook::set_once();
-        let Request::Start {
-            width_px,
-            height_px,
-            pixel_ratio,
-            device,
-        } = read(&request)?
-        else {
-            return Err(js_sys::Error::new("the first message must be `start`").into());
-        };
-        let engine = Rc::new(Engine::find(canvas, device, emit).await?);
-        engine.input(InputEvent::Resize {
-            width_px,
-            height_px,
-            pixel_ratio,
-        });
-        Ok(Handle(engine))
-    }
-
-    /// Takes a request; the work goes on in tasks of its own.
-    ///
-    /// # Errors
-    /// When `request` is none of the messages.
-    pub fn handle(&self, request: Ts<Request>, files: Vec<File>) -> Result<(), JsValue> {
-        let engine = self.0.clone();
-        match read(&request)? {
-            Request::Start { .. } => {}
-            Request::OpenFolder { paths } => {
-                let folder = DroppedFolder::new(paths, files);
-                spawn_local(job::open(engine, Origin::Folder(folder)));
-            }
-            Request::OpenZip => {
-                if let Some(file) = files.into_iter().next() {
-                    spawn_local(job::open(engine, Origin::Zip(DroppedZip(file))));
-                }
-            }
-            Request::OpenSample { seed } => {
-                spawn_local(job::open(engine, Origin::Sample(seed)));
-            }
-            Request::Replan { options } => {
-                job::plan(&engine, convert::options(options));
-            }
-            Request::Run { options } => spawn_local(job::run(engine, options)),
-            Request::Pause => engine.change(RunState::Running, RunState::Pausing),
-            Request::Resume => {
-                engine.change(RunState::Pausing, RunState::Running);
-                engine.change(RunState::Paused, RunState::Running);
-            }
-            Request::Cancel => engine.stop(),
-            Request::Export {
-                id,
-                format,
-                canonical,
-            } => spawn_local(job::export(engine, id, format, canonical)),
-            Request::Screenshot { id } => spawn_local(job::screenshot(engine, id)),
-            Request::Input { input } => engine.input(input),
-            Request::View { view } => engine.on_stage(|stage| {
-                stage.look = convert::look(view, stage.look.floor_height_m);
-                stage.controls.set_reduced_motion(view.reduced_motion);
-            }),
-            Request::Look { at } => engine.look(at),
-        }
-        Ok(())
-    }
-}
-
-fn read(request: &Ts<Request>) -> Result<Request, JsValue> {
-    let request = request.to_rust();
-    request.map_err(|error| js_sys::Error::new(&error.to_string()).into())
-}
-
 impl Engine {
-    async fn find(
+    /// Finds a device and sets the engine up on it.
+    pub async fn find(
         canvas: Option<OffscreenCanvas>,
         choice: DeviceChoice,
         emit: Function,
@@ -274,13 +186,15 @@ impl Engine {
         self.state.set(state);
     }
 
-    fn change(&self, from: RunState, to: RunState) {
+    /// From one state to another; nothing where the run is in neither.
+    pub fn change(&self, from: RunState, to: RunState) {
         if self.state() == from {
             self.set_state(to);
         }
     }
 
-    fn stop(&self) {
+    /// Asks a run that is on to end.
+    pub fn stop(&self) {
         if self.state() != RunState::Idle {
             self.set_state(RunState::Stopping);
         }
@@ -333,8 +247,8 @@ impl Engine {
 
     /// Bricks and triangles on show.
     pub fn counts(&self) -> (u32, u32) {
-        let stage = self.stage.try_borrow();
-        stage.map_or((0, 0), |stage| stage.as_ref().map_or((0, 0), Stage::counts))
+        let stage = self.stage.borrow();
+        stage.as_ref().map_or((0, 0), Stage::counts)
     }
 
     /// Where the visitor stands; `None` where nobody watches.
@@ -345,15 +259,17 @@ impl Engine {
 
     /// Shows new versions of bricks.
     pub async fn show(self: &Rc<Self>, meshes: BrickMeshes) -> Result<(), VolumeError> {
-        // The stage is taken out while its painter waits for the device, so that a message in between finds none
-        // instead of a borrowed one.
-        let stage = self.stage.take();
-        if let Some(mut stage) = stage {
-            let shown = stage.show(meshes).await;
-            self.stage.replace(Some(stage));
-            self.ask_frame();
-            shown?;
+        let reads = self.stage.borrow().as_ref().map(Stage::reads_bricks);
+        let bricks = match reads {
+            None => return Ok(()),
+            Some(false) => Bricks::OnDevice(meshes),
+            // The stage is not held while the device is waited for: messages that come meanwhile find it.
+            Some(true) => Bricks::Read(handoff::read(meshes).await?),
+        };
+        if let Some(stage) = self.stage.borrow_mut().as_mut() {
+            stage.show(bricks)?;
         }
+        self.ask_frame();
         Ok(())
     }
 
@@ -369,7 +285,8 @@ impl Engine {
         self.ask_frame();
     }
 
-    fn input(self: &Rc<Self>, event: InputEvent) {
+    /// Takes the visitor's input.
+    pub fn input(self: &Rc<Self>, event: InputEvent) {
         self.touched.set(true);
         self.on_stage(|stage| match event {
             InputEvent::DoubleClick { x, y } => stage.focus_at(Vec2::new(x, y)),
@@ -381,7 +298,16 @@ impl Engine {
         });
     }
 
-    fn look(self: &Rc<Self>, at: LookAt) {
+    /// Changes how the view is drawn.
+    pub fn view(self: &Rc<Self>, view: ViewOptions) {
+        self.on_stage(|stage| {
+            stage.look = convert::look(view, stage.look.floor_height_m);
+            stage.controls.set_reduced_motion(view.reduced_motion);
+        });
+    }
+
+    /// Puts the camera somewhere.
+    pub fn look(self: &Rc<Self>, at: LookAt) {
         self.touched.set(true);
         self.on_stage(|stage| match at {
             LookAt::Home => stage.controls.home(),
@@ -412,9 +338,7 @@ impl Engine {
         if busy && !self.touched.get() && since_ms < RUN_FRAME_MS {
             return self.ask_frame();
         }
-        let Ok(mut stage) = self.stage.try_borrow_mut() else {
-            return self.ask_frame();
-        };
+        let mut stage = self.stage.borrow_mut();
         let Some(stage) = stage.as_mut() else {
             return;
         };

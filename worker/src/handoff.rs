@@ -2,10 +2,10 @@
 
 use burn_cubecl::CubeBackend;
 use cubecl::wgpu::{AutoCompiler, WgpuServer};
+use mesh::soup::{VERTEX_FLOATS, VERTEX_STRIDE_BYTES};
+use std::ops::Range;
 use view::{Arena, CpuPainter};
-use volume::{BrickMeshes, VolumeError};
-
-const VERTEX_BYTES: u64 = mesh::soup::VERTEX_STRIDE_BYTES;
+use volume::{Brick, BrickMeshes, VolumeError};
 
 fn lost(error: impl std::fmt::Debug) -> VolumeError {
     VolumeError::Device(format!("{error:?}"))
@@ -38,7 +38,7 @@ pub fn to_arena(
     cube.client.flush().map_err(lost)?;
     let source = resource.resource();
     for (brick, rows) in ranges {
-        let offset = source.offset + rows.start as u64 * VERTEX_BYTES;
+        let offset = source.offset + rows.start as u64 * VERTEX_STRIDE_BYTES;
         let count = rows.len() as u32;
         let inserted = arena.insert(
             &mut encoder,
@@ -53,15 +53,26 @@ pub fn to_arena(
     Ok(())
 }
 
-/// Reads bricks and gives them to the painter that works without a GPU.
-pub async fn to_painter(meshes: BrickMeshes, painter: &mut CpuPainter) -> Result<(), VolumeError> {
+/// Reads bricks, for the painter that works without a GPU.
+pub async fn read(meshes: BrickMeshes) -> Result<Soup, VolumeError> {
     let BrickMeshes { vertices, ranges } = meshes;
-    let [_, numbers] = vertices.dims();
     let data = vertices.into_data_async().await.map_err(lost)?;
-    let soup = data.as_slice::<f32>().map_err(lost)?;
-    for (brick, rows) in ranges {
-        let part = &soup[rows.start * numbers..rows.end * numbers];
-        painter.insert(brick.to_array(), part);
+    let numbers = data.try_to_vec().map_err(lost)?;
+    Ok(Soup { numbers, ranges })
+}
+
+/// Bricks in main memory.
+pub struct Soup {
+    numbers: Vec<f32>,
+    ranges: Vec<(Brick, Range<usize>)>,
+}
+
+impl Soup {
+    /// Gives the bricks to a painter.
+    pub fn hand_to(&self, painter: &mut CpuPainter) {
+        for (brick, rows) in &self.ranges {
+            let numbers = rows.start * VERTEX_FLOATS..rows.end * VERTEX_FLOATS;
+            painter.insert(brick.to_array(), &self.numbers[numbers]);
+        }
     }
-    Ok(())
 }

@@ -223,6 +223,7 @@ impl Sink for PageSink {
             total: self.total as u32,
             triangles,
             elapsed_s: self.elapsed_s(),
+            heap_bytes: platform::heap_bytes(),
         });
     }
 

@@ -7,10 +7,11 @@
 mod convert;
 mod engine;
 mod files;
+mod handle;
 mod handoff;
 mod job;
 pub mod messages;
 mod platform;
 mod stage;
 
-pub use engine::Handle;
+pub use handle::Handle;

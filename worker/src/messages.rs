@@ -287,6 +287,8 @@ pub enum Event {
         triangles: u32,
         /// Seconds since the run began, pauses left out.
         elapsed_s: f64,
+        /// Size of the engine's memory in bytes.
+        heap_bytes: f64,
     },
     /// Bricks of the mesh changed on show.
     Bricks {

@@ -1,6 +1,6 @@
 //! What the visitor looks at: the canvas, the painter that fits the device, and the camera in the visitor's hands.
 
-use crate::handoff;
+use crate::handoff::{self, Soup};
 use glam::Vec2;
 use js_sys::Object;
 use mesh::Bounds;
@@ -34,6 +34,13 @@ pub struct Stage {
     pub look: Look,
     pub frusta: Frusta,
     pick_at: Option<Vec2>,
+}
+
+/// Bricks on their way to the stage: one value at a time, so that its size costs nothing.
+#[allow(clippy::large_enum_variant)]
+pub enum Bricks {
+    OnDevice(BrickMeshes),
+    Read(Soup),
 }
 
 // One of each in a worker: the difference in size costs nothing.
@@ -113,13 +120,19 @@ impl Stage {
         self.controls.home();
     }
 
-    /// Shows new versions of bricks.
-    pub async fn show(&mut self, meshes: BrickMeshes) -> Result<(), VolumeError> {
-        match &mut self.paper {
-            Paper::Gpu { gpu, arena, .. } => {
+    /// Whether bricks must be read from the device before [`Stage::show`] can take them.
+    pub fn reads_bricks(&self) -> bool {
+        matches!(self.paper, Paper::Cpu { .. })
+    }
+
+    /// Shows new versions of bricks, in the form that [`Stage::reads_bricks`] asks for.
+    pub fn show(&mut self, bricks: Bricks) -> Result<(), VolumeError> {
+        match (&mut self.paper, bricks) {
+            (Paper::Gpu { gpu, arena, .. }, Bricks::OnDevice(meshes)) => {
                 handoff::to_arena(meshes, arena, &gpu.device, &gpu.queue)?;
             }
-            Paper::Cpu { painter, .. } => handoff::to_painter(meshes, painter).await?,
+            (Paper::Cpu { painter, .. }, Bricks::Read(soup)) => soup.hand_to(painter),
+            _ => return Ok(()),
         }
         let (outline, bounds) = match &self.paper {
             Paper::Gpu { arena, .. } => (arena.outline(), arena.bounds()),

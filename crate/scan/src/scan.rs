@@ -195,7 +195,7 @@ fn check_size(path: &str, (width, height): (u32, u32), camera: &Camera) -> Resul
     Err(FrameError::WrongSize(Box::new(
         frame_finding("image-size", path)
             .expected(format!(
-                "{}x{} pixels, as the first picture of its kind",
+                "{}x{} pixels, as most of its kind",
                 camera.width, camera.height
             ))
             .found(format!("{width}x{height}"))

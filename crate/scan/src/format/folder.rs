@@ -5,6 +5,9 @@ use std::collections::{HashMap, HashSet};
 use crate::image;
 use crate::source::{Source, SourceError};
 
+/// Pictures whose size is asked for when a scan is opened.
+const VOTING_PICTURES: usize = 5;
+
 /// All folders of a source.
 pub(super) struct Listing<'a> {
     source: &'a dyn Source,
@@ -139,8 +142,9 @@ impl<'a> Folder<'a> {
         Ok(String::from_utf8_lossy(&bytes).into_owned())
     }
 
-    /// Width and height of the first picture whose header can be read.
-    pub(super) fn first_size<'p>(
+    /// Width and height that most of the first few pictures have whose header can be read: one odd picture must not
+    /// decide for the others.
+    pub(super) fn usual_size<'p>(
         &self,
         pictures: impl IntoIterator<Item = &'p str>,
     ) -> Option<(u32, u32)> {
@@ -151,6 +155,10 @@ impl<'a> Folder<'a> {
                 .or_else(|| image::size(&source.read(path).ok()?))
                 .filter(|&(width, height)| width > 0 && height > 0)
         };
-        pictures.into_iter().take(50).find_map(size)
+        let read = pictures.into_iter().take(50).filter_map(size);
+        let sizes: Vec<(u32, u32)> = read.take(VOTING_PICTURES).collect();
+        let votes = |size: &(u32, u32)| sizes.iter().filter(|other| *other == size).count();
+        // Of equals the first, which is what `max_by_key` gives when it walks backwards.
+        sizes.iter().rev().max_by_key(|size| votes(size)).copied()
     }
 }

@@ -80,8 +80,8 @@ fn cameras(
     table: &FileTable,
     log: &mut FindingLog,
 ) -> Result<(Camera, Camera), ScanError> {
-    let color_size = folder.first_size(numbered::paths(table, |f| f.color.as_ref()));
-    let depth_size = folder.first_size(numbered::paths(table, |f| f.depth.as_ref()));
+    let color_size = folder.usual_size(numbered::paths(table, |f| f.color.as_ref()));
+    let depth_size = folder.usual_size(numbered::paths(table, |f| f.depth.as_ref()));
     // A scan without one kind of picture still gets both cameras.
     let (color_size, depth_size) = match (color_size, depth_size) {
         (Some(color), Some(depth)) => (color, depth),

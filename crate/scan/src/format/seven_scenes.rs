@@ -87,8 +87,8 @@ fn cameras(
     table: &FileTable,
     log: &mut FindingLog,
 ) -> Result<(Camera, Camera), ScanError> {
-    let color_size = folder.first_size(numbered::paths(table, |f| f.color.as_ref()));
-    let depth_size = folder.first_size(numbered::paths(table, |f| f.depth.as_ref()));
+    let color_size = folder.usual_size(numbered::paths(table, |f| f.color.as_ref()));
+    let depth_size = folder.usual_size(numbered::paths(table, |f| f.depth.as_ref()));
     let color_or_depth = color_size.or(depth_size).unwrap_or(ORIGINAL_SIZE);
     let found = match intrinsics::find(folder, &[INTRINSICS])? {
         None => match folder.parent() {

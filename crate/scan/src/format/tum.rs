@@ -184,7 +184,7 @@ fn cameras(
     icl: bool,
     log: &mut FindingLog,
 ) -> Result<(Camera, Camera), ScanError> {
-    let paths = |list: &'_ Pictures| folder.first_size(list.iter().map(|p| p.value.0.as_str()));
+    let paths = |list: &'_ Pictures| folder.usual_size(list.iter().map(|p| p.value.0.as_str()));
     let (color_size, depth_size) = (paths(colors), paths(depths));
     let size = color_size.or(depth_size).unwrap_or(SIZE);
     let color = match intrinsics::find(folder, &INTRINSICS)? {

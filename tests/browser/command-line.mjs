@@ -1,0 +1,22 @@
+// The command line, for comparison with the page: the same crate fuses and judges.
+import { execFile } from 'node:child_process';
+import { promisify } from 'node:util';
+import { join } from 'node:path';
+import { buildEnv } from '../../tools/env.mjs';
+import { must, root } from '../../tools/run.mjs';
+
+const program = join(root, 'target/release/ipdrecon');
+const execute = promisify(execFile);
+
+/** Builds the command line; cheap when it is built. */
+export const build = () => must('cargo', ['build', '--release', '--workspace', '--locked'], { env: buildEnv() });
+
+/** Fuses a scan into a mesh. */
+export const fuse = (scan, out) => execute(program, ['fuse', scan, '-o', out]);
+
+/** The figures of a mesh, as the object that `--json` prints. */
+export async function judge(pred, gt, protocol, scan) {
+  const words = ['eval', '--pred', pred, '--gt', gt, '--protocol', protocol, '--json', ...(scan ? ['--scan', scan] : [])];
+  const { stdout } = await execute(program, words, { maxBuffer: 1 << 24 });
+  return JSON.parse(stdout);
+}
