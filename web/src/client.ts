@@ -72,6 +72,9 @@ export interface Reconstructor {
   ): void;
 }
 
+/** The sample room that is shown unless another is asked for. */
+export const SAMPLE_SEED = 17;
+
 /** One engine in one worker: opens a scan, runs it, exports its mesh. */
 export class Reconstructor extends EventTarget {
   /** Settles when the engine is up, or could not be started. */
@@ -135,7 +138,7 @@ export class Reconstructor extends EventTarget {
   }
 
   /** Opens the sample room that is made by rule. */
-  openSample(seed = 1): Promise<PlanSummary> {
+  openSample(seed = SAMPLE_SEED): Promise<PlanSummary> {
     return this.#openWith(undefined, seed);
   }
 

@@ -118,7 +118,7 @@ export class IpdReconElement extends HTMLElement {
   }
 
   /** Opens the sample room that is made by rule. */
-  openSample(seed = 1, options?: OpenOptions): Promise<PlanSummary> {
+  openSample(seed?: number, options?: OpenOptions): Promise<PlanSummary> {
     return this.#begin((client) => client.openSample(seed), options);
   }
 

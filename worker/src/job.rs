@@ -49,7 +49,7 @@ fn open_source(origin: Origin) -> Result<Rc<dyn Source>, ScanError> {
             let name = zip.0.name();
             Rc::new(ZipSource::open_named(&name, zip)?)
         }
-        Origin::Sample(seed) => Rc::new(synth::SampleScan::new(u64::from(seed), 36, 320, 240)),
+        Origin::Sample(seed) => Rc::new(synth::SampleScan::walk(u64::from(seed))),
     })
 }
 

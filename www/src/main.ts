@@ -82,4 +82,4 @@ wirePanel(viewer);
 if (query.get("device") === "cpu") viewer.setAttribute("device", "cpu");
 viewer.append(Object.assign(document.createElement("span"), { slot: "empty" }));
 byId("stage").prepend(viewer);
-if (query.has("sample")) viewer.openSample(Number(query.get("sample")) || 1, { autostart: query.get("autostart") !== "0" }).catch(() => undefined);
+if (query.has("sample")) viewer.openSample(Number(query.get("sample")) || undefined, { autostart: query.get("autostart") !== "0" }).catch(() => undefined);

@@ -11,7 +11,7 @@ export function wireStart(viewer: IpdReconElement): void {
   const zipInput = byId<HTMLInputElement>("zip-input");
   byId("pick-folder").addEventListener("click", () => void pickFolder(folderInput, open));
   byId("pick-zip").addEventListener("click", () => zipInput.click());
-  byId("sample").addEventListener("click", () => void viewer.openSample(1, { autostart: true }).catch(() => undefined));
+  byId("sample").addEventListener("click", () => void viewer.openSample(undefined, { autostart: true }).catch(() => undefined));
   for (const input of [folderInput, zipInput]) {
     input.addEventListener("change", () => {
       if (input.files && input.files.length > 0) open([...input.files]);

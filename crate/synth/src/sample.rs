@@ -42,9 +42,14 @@ impl SampleScan {
         .with_layout(Layout::SevenScenes)
     }
 
-    /// The sample the page starts with: 36 pictures of 320 by 240 pixels.
+    /// A walk as the page offers it: 36 pictures of 320 by 240 pixels.
+    pub fn walk(seed: u64) -> Self {
+        Self::new(seed, 36, 320, 240)
+    }
+
+    /// The sample the page starts with.
     pub fn first() -> Self {
-        Self::new(17, 36, 320, 240)
+        Self::walk(17)
     }
 
     /// The same walk in another layout.
