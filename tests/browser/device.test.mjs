@@ -17,7 +17,10 @@ test('without WebGPU the sample is made on the CPU, and the page says so', async
   await visitor.until('idle');
   const ready = await visitor.event('ready');
   assert.equal(ready.device, 'cpu');
-  assert.match(await page.locator('#device-note').innerText(), /CPU|processor/);
+  assert.match(ready.note, /^[\w ,:]+$/, 'a sentence for people');
+  assert.match(ready.note, /no WebGPU.*processor/);
+  assert.match(ready.adapter, /adapter/, 'why, for the report');
+  assert.equal(await page.locator('#device-note').innerText(), ready.note);
   assert.equal(await page.locator('#device').innerText(), 'CPU');
   await page.click('#sample');
   await visitor.until('finished');

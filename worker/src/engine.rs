@@ -61,7 +61,8 @@ impl Engine {
         choice: DeviceChoice,
         emit: Function,
     ) -> Result<Self, JsValue> {
-        let mut note = None;
+        let mut adapter = "burn flex, one thread".to_owned();
+        let mut note = "The processor does the work, as was asked for";
         if choice == DeviceChoice::Auto {
             let options = Device::wgpu_options().tasks_max(TASKS_A_SUBMIT);
             match options.init_with_setup_async().await {
@@ -69,14 +70,9 @@ impl Engine {
                     return Self::on_gpu(canvas, device, setup, emit).map_err(JsValue::from);
                 }
                 Err(error) => {
-                    note = Some(format!(
-                        "WebGPU is not to be had in this browser ({}); the work is done by the processor, more slowly",
-                        error
-                            .to_string()
-                            .lines()
-                            .next()
-                            .unwrap_or("no reason given"),
-                    ));
+                    // Words for the report; the visitor is told what it means.
+                    adapter = format!("{adapter}; {error}");
+                    note = "This browser offers no WebGPU: the processor does the work, which takes longer";
                 }
             }
         }
@@ -84,8 +80,8 @@ impl Engine {
         let engine = Self::new(emit, Device::flex(), Limits::default(), stage);
         engine.emit(&Event::Ready {
             device: "cpu".to_owned(),
-            adapter: "burn flex, one thread".to_owned(),
-            note: note.or_else(|| Some("The processor was asked for".to_owned())),
+            adapter,
+            note: Some(note.to_owned()),
         });
         Ok(engine)
     }
