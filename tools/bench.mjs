@@ -7,20 +7,27 @@ import { must, root } from './run.mjs';
 import { setup } from './setup.mjs';
 
 if (!(await setup('test'))) process.exit(1);
+const { build } = await import('./build.mjs');
+await build();
 const output = await must('cargo', ['bench', '--quiet', '--workspace', '--bench', 'fusion'], { env: gpu(buildEnv()) });
-const table = output.split('\n').filter((line) => line.startsWith('|') || line.startsWith('medians')).join('\n').replace('\nmedians', '\n\nmedians');
-const machine = `${cpus().length} cores of ${cpus()[0]?.model ?? 'an unknown processor'}`;
+const native = output.split('\n').filter((line) => line.startsWith('|') || line.startsWith('medians')).join('\n').replace('\nmedians', '\n\nmedians');
+const browser = await (await import('../tests/browser/bench.mjs')).table();
 const text = `# Benchmarks
 
-Written by \`npm run bench\`. Machines differ and are shared: compare the rows of one table with each other, not with another run's.
+Written by \`npm run bench\` on ${cpus().length} cores of ${cpus()[0]?.model ?? 'an unknown processor'}. Machines differ and are shared: compare the rows of one table with each
+other, not with another run's. Where there is no GPU, wgpu is Mesa's lavapipe and Chromium's WebGPU is SwiftShader, processors that
+play one: the ratios then say nothing about a GPU. The real scans are not part of this repository.
 
-## Fusion: \`flex\` (the CPU device) against wgpu, natively
+## Fusion on the command line: \`flex\` (the CPU device, all cores) against wgpu
 
-${machine}. Where there is no GPU, wgpu is Mesa's lavapipe, a processor that plays one: the ratios then say nothing about a GPU.
 A frame is decoded (the sample room's is drawn while it is read), its bricks are chosen and its depth is integrated; a brick is
 classified, placed and its triangles are made.
 
-${table}
+${native}
+
+## Fusion on the page: WebGPU against the CPU device (one thread), with pictures drawn meanwhile
+
+${browser}
 `;
 writeFileSync(join(root, 'BENCHMARKS.md'), text);
 console.log(text);

@@ -30,12 +30,14 @@ const cases = [
   ['a pose with NaN', (s) => ({ ...s, [first('pose.txt')]: '1 0 0 nan\n0 1 0 0\n0 0 1 0\n0 0 0 1\n' }), first('pose.txt'), frames - 1],
   ['a pose with inf', (s) => ({ ...s, [first('pose.txt')]: '1 0 0 0\n0 1 0 -inf\n0 0 1 0\n0 0 0 1\n' }), first('pose.txt'), frames - 1],
   ['a pose that is no rotation', (s) => ({ ...s, [first('pose.txt')]: '2 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n' }), first('pose.txt'), frames - 1],
+  ['no intrinsics', (s) => without(s, 'camera-intrinsics.txt'), 'camera-intrinsics.txt', 0],
   ['intrinsics of zero', (s) => ({ ...s, 'camera-intrinsics.txt': '0 0 48\n0 0 36\n0 0 1\n' }), 'camera-intrinsics.txt', 0],
   // Depth without its colour still gives a surface.
   ['a truncated photo', (s) => cut(s, first('color.png')), first('color.png'), frames],
   ['a truncated depth image', (s) => cut(s, first('depth.png')), first('depth.png'), frames - 1],
   ['depth of another size', (s) => ({ ...s, [first('depth.png')]: depthPng(0, { width: 31, height: 17 }) }), first('depth.png'), frames - 1],
   ['a missing depth image', (s) => without(s, first('depth.png')), /frame-000000/, frames - 1],
+  ['a missing pose', (s) => without(s, first('pose.txt')), /frame-000000/, frames - 1],
 ];
 
 for (const [what, spoil, named, goOn] of cases) {

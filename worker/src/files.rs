@@ -1,35 +1,42 @@
 //! The visitor's files as a scan's source: read in place when they are needed, never all at once.
 
-use js_sys::Uint8Array;
+use js_sys::{Array, Uint8Array};
 use scan::{Entry, RandomRead, Source, SourceError};
 use std::{collections::HashMap, io};
+use wasm_bindgen::JsCast;
 use web_sys::{Blob, File, FileReaderSync};
 
 /// A dropped folder.
 pub struct DroppedFolder {
     name: String,
     entries: Vec<Entry>,
-    files: HashMap<String, File>,
+    /// Where each path's file lies in `files`.
+    places: HashMap<String, u32>,
+    files: Array,
+    /// Contents of text files, at the places of their files; nothing at other places.
+    texts: Array,
 }
 
 impl DroppedFolder {
-    /// The files of a folder and their paths in it.
-    pub fn new(paths: Vec<String>, files: Vec<File>) -> Self {
+    /// The paths of a folder's files, one a line, the files, and what was read of them already.
+    pub fn new(paths: &str, files: Array, texts: Array) -> Self {
+        let paths: Vec<String> = paths.lines().map(str::to_owned).collect();
         let first = paths.first().and_then(|path| path.split_once('/'));
         let name = first.map_or("scan", |(folder, _)| folder).to_owned();
-        let entries = paths.iter().zip(&files).map(|(path, file)| Entry {
-            path: path.clone(),
-            size_bytes: file.size() as u64,
-        });
+        let entries = paths.iter().map(|path| Entry { path: path.clone() });
         Self {
             name,
             entries: entries.collect(),
-            files: paths.into_iter().zip(files).collect(),
+            places: paths.into_iter().zip(0..).collect(),
+            files,
+            texts,
         }
     }
 
-    fn file(&self, path: &str) -> Result<&File, SourceError> {
-        self.files.get(path).ok_or_else(|| SourceError::NotFound {
+    fn file(&self, path: &str) -> Result<File, SourceError> {
+        let place = self.places.get(path);
+        let file = place.and_then(|&place| self.files.get(place).dyn_into().ok());
+        file.ok_or_else(|| SourceError::NotFound {
             path: path.to_owned(),
         })
     }
@@ -41,12 +48,18 @@ impl Source for DroppedFolder {
     }
 
     fn read(&self, path: &str) -> Result<Vec<u8>, SourceError> {
-        read(self.file(path)?).map_err(|error| unreadable(path, &error))
+        let text = self.places.get(path).map(|&place| self.texts.get(place));
+        if let Some(text) = text.and_then(|text| text.as_string()) {
+            return Ok(text.into_bytes());
+        }
+        let file = self.file(path)?;
+        read(&file).map_err(|error| unreadable(path, &error))
     }
 
     fn read_head(&self, path: &str, len: usize) -> Result<Vec<u8>, SourceError> {
         let file = self.file(path)?;
-        read_range(file, 0, len.min(file.size() as usize)).map_err(|error| unreadable(path, &error))
+        read_range(&file, 0, len.min(file.size() as usize))
+            .map_err(|error| unreadable(path, &error))
     }
 
     fn name(&self) -> &str {

@@ -7,10 +7,10 @@ use crate::{
     job::{self, Origin},
     messages::{InputEvent, Request},
 };
-use js_sys::Function;
+use js_sys::{Array, Function};
 use std::rc::Rc;
 use tsify::Ts;
-use wasm_bindgen::{JsValue, prelude::wasm_bindgen};
+use wasm_bindgen::{JsCast, JsValue, prelude::wasm_bindgen};
 use wasm_bindgen_futures::spawn_local;
 use web_sys::{File, OffscreenCanvas};
 
@@ -48,20 +48,21 @@ impl Handle {
         Ok(Handle(engine))
     }
 
-    /// Takes a request; the work goes on in tasks of its own.
+    /// Takes a request, and beside it the files and the contents of text files among them, each as one array: a handle for
+    /// each of thousands of files would take seconds to make. The work goes on in tasks of its own.
     ///
     /// # Errors
     /// When `request` is none of the messages.
-    pub fn handle(&self, request: Ts<Request>, files: Vec<File>) -> Result<(), JsValue> {
+    pub fn handle(&self, request: Ts<Request>, files: Array, texts: Array) -> Result<(), JsValue> {
         let engine = self.0.clone();
         match read(&request)? {
             Request::Start { .. } => {}
             Request::OpenFolder { paths } => {
-                let folder = DroppedFolder::new(paths, files);
+                let folder = DroppedFolder::new(&paths, files, texts);
                 spawn_local(job::open(engine, Origin::Folder(folder)));
             }
             Request::OpenZip => {
-                if let Some(file) = files.into_iter().next() {
+                if let Ok(file) = files.get(0).dyn_into::<File>() {
                     spawn_local(job::open(engine, Origin::Zip(DroppedZip(file))));
                 }
             }

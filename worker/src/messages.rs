@@ -28,8 +28,9 @@ pub enum Request {
     },
     /// Open a dropped folder: the files are passed beside it, one for each path, in the same order.
     OpenFolder {
-        /// Paths relative to what was dropped, forward slashes.
-        paths: Vec<String>,
+        /// Paths relative to what was dropped, forward slashes, one a line: one string, because thousands would take
+        /// seconds to hand over.
+        paths: String,
     },
     /// Open a dropped zip: the file is passed beside it.
     OpenZip,

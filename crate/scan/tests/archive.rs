@@ -28,7 +28,6 @@ fn archives_of_another_program_stored_deflated_and_zip64() {
         let source = ZipSource::open(archive.to_vec()).unwrap();
         assert_eq!(paths(&source), ["deep/er/deflated.txt", "stored.txt"]);
         for entry in source.entries() {
-            assert_eq!(entry.size_bytes, text.len() as u64);
             assert_eq!(source.read(&entry.path).unwrap(), text);
             assert_eq!(source.read_head(&entry.path, 30).unwrap(), text[..30]);
             assert_eq!(source.read_head(&entry.path, 9999).unwrap(), text);

@@ -73,10 +73,7 @@ fn list(folder: &Path, prefix: &str, depth: usize, entries: &mut Vec<Entry>) -> 
             continue;
         };
         if metadata.is_file() {
-            entries.push(Entry {
-                path,
-                size_bytes: metadata.len(),
-            });
+            entries.push(Entry { path });
         } else if metadata.is_dir() && depth < MAX_DEPTH {
             list(&item.path(), &format!("{path}/"), depth + 1, entries)?;
         }

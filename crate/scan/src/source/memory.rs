@@ -16,11 +16,8 @@ impl MemorySource {
     pub fn new(files: impl IntoIterator<Item = (String, Vec<u8>)>) -> Self {
         let contents: HashMap<String, Vec<u8>> = files.into_iter().collect();
         let mut entries: Vec<Entry> = contents
-            .iter()
-            .map(|(path, bytes)| Entry {
-                path: path.clone(),
-                size_bytes: bytes.len() as u64,
-            })
+            .keys()
+            .map(|path| Entry { path: path.clone() })
             .collect();
         entries.sort_by(|a, b| a.path.cmp(&b.path));
         MemorySource { entries, contents }

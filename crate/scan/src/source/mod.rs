@@ -18,8 +18,6 @@ pub use zip::ZipSource;
 pub struct Entry {
     /// Path relative to the source's root, with forward slashes.
     pub path: String,
-    /// Size in bytes, uncompressed.
-    pub size_bytes: u64,
 }
 
 /// A set of files that can be read one by one.

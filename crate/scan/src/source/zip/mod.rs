@@ -38,11 +38,8 @@ impl<R: RandomRead> ZipSource<R> {
     pub fn open_named(archive: &str, reader: R) -> Result<Self, SourceError> {
         let members = directory::read(&reader, archive)?;
         let mut entries: Vec<Entry> = members
-            .iter()
-            .map(|(path, member)| Entry {
-                path: path.clone(),
-                size_bytes: member.size_bytes,
-            })
+            .keys()
+            .map(|path| Entry { path: path.clone() })
             .collect();
         entries.sort_by(|a, b| a.path.cmp(&b.path));
         Ok(ZipSource {
