@@ -55,6 +55,8 @@ for (const [what, spoil, named, goOn] of cases) {
       assert.ok(finding[part].length > 2, `${part}: ${finding[part]}`);
       assert.ok(panel.includes(finding[part]), `the panel says ${part}: ${panel}`);
     }
+    if (finding.line !== undefined && finding.line !== null) assert.ok(panel.includes(`${finding.file}:${finding.line}`), `the panel names the line: ${panel}`);
+    else assert.ok(!what.startsWith('a pose') && !what.startsWith('intrinsics'), 'what is wrong inside a text file has a line');
     if (goOn > 0) {
       const [finished] = await visitor.events('finished');
       assert.equal(finished.frames, goOn, 'what is sound goes on');

@@ -72,3 +72,19 @@ test('a folder of 6,000 files is read without a long task', async () => {
   assert.equal(opened.frames, 12);
   await visitor.close();
 });
+
+test('a scan of 5,000 frames is open in seconds', async (t) => {
+  const path = put(join(folder, 'long'), scan(5000));
+  const visitor = await browser.open({ path: '?autostart=0' });
+  await visitor.until('idle');
+  await visitor.forget();
+  const start_ms = await visitor.page.evaluate(() => performance.now());
+  await visitor.drop(path);
+  const planned = await visitor.event('planned');
+  const [opened] = await visitor.events('opened');
+  assert.equal(opened.frames, 5000);
+  const seconds = (planned.at_ms - start_ms) / 1000;
+  t.diagnostic(`5,000 frames: planned ${seconds.toFixed(1)} s after the drop`);
+  assert.ok(seconds < 15, `${seconds} s`);
+  await visitor.close();
+});
