@@ -11,7 +11,8 @@ const { build } = await import('./build.mjs');
 await build();
 const output = await must('cargo', ['bench', '--quiet', '--workspace', '--bench', 'fusion'], { env: gpu(buildEnv()) });
 const native = output.split('\n').filter((line) => line.startsWith('|') || line.startsWith('medians')).join('\n').replace('\nmedians', '\n\nmedians');
-const browser = await (await import('../tests/browser/bench.mjs')).table();
+// By its address: the type check of the tools does not follow into the tests.
+const browser = await (await import(new URL('../tests/browser/bench.mjs', import.meta.url).href)).table();
 const text = `# Benchmarks
 
 Written by \`npm run bench\` on ${cpus().length} cores of ${cpus()[0]?.model ?? 'an unknown processor'}. Machines differ and are shared: compare the rows of one table with each
