@@ -7,7 +7,7 @@ use crate::{
     messages::{Event, FindingMessage, MeshFormat, RunOptions, StageName},
     platform,
 };
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use js_sys::{Promise, Uint8Array};
 use recon::{Flow, Options, Sink, Stage};
 use scan::{Finding, Scan, ScanError, Source, ZipSource};
@@ -279,12 +279,7 @@ pub async fn export(engine: Rc<Engine>, id: u32, format: MeshFormat, canonical: 
             return;
         }
     };
-    let mut up = Vec3::Z;
-    if !canonical {
-        let scan_from_canonical = scan.scan_from_canonical();
-        mesh.transform(&scan_from_canonical);
-        up = scan_from_canonical.transform_vector3(DVec3::Z).as_vec3();
-    }
+    let up = recon::place(&mut mesh, &scan, canonical);
     let (bytes, ending, mime) = match format {
         MeshFormat::Glb => (mesh::glb::write(&mesh, up), "glb", "model/gltf-binary"),
         MeshFormat::Ply => (mesh::ply::write(&mesh), "ply", "application/octet-stream"),

@@ -7,7 +7,6 @@ use crate::{
     progress::{Terminal, print_finding},
 };
 use clap::Args;
-use glam::Vec3;
 use recon::{Options, Plan};
 use std::{path::PathBuf, time::Instant};
 
@@ -55,14 +54,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     terminal.finish();
     let outcome = outcome?;
     let mut mesh = pollster::block_on(outcome.volume.mesh())?;
-    let mut up = Vec3::Z;
-    if !arguments.canonical {
-        let scan_from_canonical = scan.scan_from_canonical();
-        mesh.transform(&scan_from_canonical);
-        up = scan_from_canonical
-            .transform_vector3(glam::DVec3::Z)
-            .as_vec3();
-    }
+    let up = recon::place(&mut mesh, &scan, arguments.canonical);
     format.write(&mesh, up, &arguments.output)?;
     eprintln!(
         "{}: {} vertices, {} triangles from {} keyframes in {:.1} s",

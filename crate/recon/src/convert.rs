@@ -1,8 +1,8 @@
 //! From the scan's types to the volume's and the mesh's: neither room knows the other.
 
-use glam::Affine3A;
-use mesh::camera::Pinhole;
-use scan::{Camera, ColorImage, DepthImage, Frame};
+use glam::{Affine3A, DVec3, Vec3};
+use mesh::{Mesh, camera::Pinhole};
+use scan::{Camera, ColorImage, DepthImage, Frame, Scan};
 use volume::DepthView;
 
 /// A frame's pictures as the volume takes them, colour where there is any.
@@ -22,6 +22,17 @@ pub(crate) fn depth_view<'a>(
 /// A frame's pose, camera to canonical world, in single precision.
 pub fn pose(frame: &Frame) -> Affine3A {
     Affine3A::from_mat4(glam::DMat4::from(frame.pose).as_mat4())
+}
+
+/// Puts a mesh from the canonical world where exports lie: in the scan's own world, or left as it is for `canonical`.
+/// Gives back which way is up there.
+pub fn place(mesh: &mut Mesh, scan: &Scan, canonical: bool) -> Vec3 {
+    if canonical {
+        return Vec3::Z;
+    }
+    let scan_from_canonical = scan.scan_from_canonical();
+    mesh.transform(&scan_from_canonical);
+    scan_from_canonical.transform_vector3(DVec3::Z).as_vec3()
 }
 
 /// A scan's camera as the mesh's rasteriser and the volume take it.

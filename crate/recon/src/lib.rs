@@ -7,7 +7,7 @@ mod event;
 mod plan;
 mod run;
 
-pub use convert::{pinhole, pose};
+pub use convert::{pinhole, place, pose};
 pub use event::{Flow, Sink, Stage};
 pub use plan::{Limits, Options, Plan, PlanError, plan};
 pub use run::{Outcome, RunError, run};

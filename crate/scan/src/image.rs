@@ -45,6 +45,14 @@ pub(crate) struct DepthCode {
     pub invalid: Option<u16>,
 }
 
+impl DepthCode {
+    /// Whole millimetres, and the largest number where nothing was measured.
+    pub(crate) const MILLIMETRES: Self = Self {
+        units_per_m: 1000.0,
+        invalid: Some(u16::MAX),
+    };
+}
+
 /// Why bytes are not the picture that was expected.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct DecodeFault {

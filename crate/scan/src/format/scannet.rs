@@ -66,10 +66,7 @@ pub(super) fn draft(folder: &Folder<'_>, log: &mut FindingLog) -> Result<Draft, 
     let cameras = cameras(folder, &table, log)?;
     Ok(Draft {
         frames: numbered::frames(folder, &table, cameras, true, log),
-        depth_code: DepthCode {
-            units_per_m: 1000.0,
-            invalid: Some(u16::MAX),
-        },
+        depth_code: DepthCode::MILLIMETRES,
         up: Some(DVec3::Z),
         scan_from_draft: DMat3::IDENTITY,
     })

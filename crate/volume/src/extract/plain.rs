@@ -162,15 +162,13 @@ impl Block {
         let low = edge.clone() % 2;
         let high = edge / 2 % 2;
         let along = [0, 1, 2].map(|a| axis.clone().equal_elem(a).int().cast(DType::I32));
-        let across = along.clone().map(|along| along * -1 + 1);
-        let [across_x, across_y, across_z] = across;
+        let across = |axis: usize| along[axis].clone() * -1 + 1;
         // On the two other axes, in order, the offsets are `low` and `high`.
         let offset = [
-            low.clone() * across_x.clone(),
+            low.clone() * across(0),
             low * along[0].clone() + high.clone() * along[2].clone(),
-            high * across_z,
+            high * across(2),
         ];
-        debug_assert_eq!(across_y.dims(), across_x.dims());
         let brick = cell.clone() / BRICK_VOXELS as i32;
         let place: [Tensor<1, Int>; 3] = std::array::from_fn(|axis| {
             let shift = 8i32.pow(axis as u32);
