@@ -26,7 +26,7 @@ fn surface_points(view: &DepthView<'_>, max_depth_m: f32) -> Vec<Vec3> {
     let mut points = Vec::with_capacity(view.depth_m.len() / (STRIDE_PX * STRIDE_PX));
     for row in (0..camera.height as usize).step_by(STRIDE_PX) {
         for column in (0..width).step_by(STRIDE_PX) {
-            let z = view.depth_m[row * width + column];
+            let z = view.depth_at(row * width + column);
             if z > 0.0 && z <= max_depth_m {
                 let x = (column as f32 - camera.cx) / camera.fx;
                 let y = (row as f32 - camera.cy) / camera.fy;

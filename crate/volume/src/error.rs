@@ -23,7 +23,7 @@ pub enum VolumeError {
         "expected a {what} image of {expected} values ({width} x {height}), found {found}; check the camera that was given with it"
     )]
     ImageSize {
-        /// Depth or colour.
+        /// Depth, confidence or colour.
         what: &'static str,
         /// Width of the camera's image.
         width: u32,

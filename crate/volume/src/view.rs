@@ -8,6 +8,9 @@ use mesh::camera::Pinhole;
 pub struct DepthView<'a> {
     /// Depth along the optical axis in metres, row by row; 0 where nothing was measured.
     pub depth_m: &'a [f32],
+    /// How much each pixel of the depth image may be relied on, 0 to 1: its measurement's weight is multiplied by it.
+    /// A pixel of 0 counts as not measured. `None` where all may be relied on alike, which is the same as 1 everywhere.
+    pub confidence: Option<&'a [f32]>,
     /// The camera of the depth image.
     pub depth_camera: Pinhole,
     /// Colour as sRGB bytes, three a pixel, and its camera.
@@ -20,9 +23,20 @@ impl DepthView<'_> {
     /// Says whether the images have the sizes that their cameras say.
     pub(crate) fn check(&self) -> Result<(), VolumeError> {
         check_size("depth", &self.depth_camera, 1, self.depth_m.len())?;
+        if let Some(confidence) = self.confidence {
+            check_size("confidence", &self.depth_camera, 1, confidence.len())?;
+        }
         match &self.color {
             Some((rgb, camera)) => check_size("colour", camera, 3, rgb.len()),
             None => Ok(()),
+        }
+    }
+
+    /// Depth of a pixel in metres, 0 where nothing was measured or where the measurement is worth nothing.
+    pub(crate) fn depth_at(&self, pixel: usize) -> f32 {
+        match self.confidence {
+            Some(confidence) if !(confidence[pixel] > 0.0) => 0.0,
+            _ => self.depth_m[pixel],
         }
     }
 }

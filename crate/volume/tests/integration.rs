@@ -70,6 +70,7 @@ fn fuse(volume: &mut Volume, wall_m: f32) {
         let view = DepthView {
             depth_m: &depth_m,
             depth_camera: CAMERA,
+            confidence: None,
             color: Some((&rgb, CAMERA)),
             world_from_camera: pose,
         };
@@ -192,6 +193,7 @@ on_each_device! {
         let mut view = DepthView {
             depth_m: &depth_m,
             depth_camera: CAMERA,
+            confidence: None,
             color: Some((&rgb, CAMERA)),
             world_from_camera: pose,
         };

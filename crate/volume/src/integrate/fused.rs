@@ -1,6 +1,6 @@
 //! Integration as one kernel: a thread a voxel.
 
-use super::{BRICK_RECORD, Camera, NEAR_M};
+use super::{BRICK_RECORD, Camera, Images, NEAR_M};
 use crate::{
     VolumeError,
     compute::{float_buffer, float_tensor, int_buffer},
@@ -21,17 +21,18 @@ pub(super) fn integrate(
     field: &mut Field,
     records: Vec<i32>,
     camera: &Camera,
-    depth: Tensor<1>,
-    image: Option<Tensor<1>>,
+    images: Images,
 ) -> Result<(), VolumeError> {
     let device = field.device().clone();
     let weigh_by_depth = camera.rule.weigh_by_depth;
     let numbers = camera.numbers();
     let numbers = TensorData::new(numbers.clone(), [numbers.len()]);
     let camera = float_buffer(Tensor::<1>::from_data(numbers, (&device, DType::F32)))?;
-    let has_color = image.is_some();
-    let depth = float_buffer(depth)?;
-    let image = image.map_or(Ok(depth.clone()), float_buffer)?;
+    let (has_confidence, has_color) = (images.confidence.is_some(), images.color.is_some());
+    let depth = float_buffer(images.depth)?;
+    // A binding cannot stay empty: what is not read may be anything.
+    let confidence = images.confidence.map_or(Ok(depth.clone()), float_buffer)?;
+    let image = images.color.map_or(Ok(depth.clone()), float_buffer)?;
     let samples = float_buffer(field.samples.clone())?;
     let colors = float_buffer(field.colors.clone())?;
     for records in records.chunks(BRICKS_A_LAUNCH * BRICK_RECORD) {
@@ -50,8 +51,10 @@ pub(super) fn integrate(
                 records.into_buffer_arg(),
                 camera.clone().into_buffer_arg(),
                 depth.clone().into_buffer_arg(),
+                confidence.clone().into_buffer_arg(),
                 image.clone().into_buffer_arg(),
                 voxels as u32,
+                has_confidence,
                 has_color,
                 weigh_by_depth,
             );
@@ -85,8 +88,10 @@ fn integrate_kernel(
     records: &[i32],
     camera: &[f32],
     depth: &[f32],
+    confidence: &[f32],
     image: &[f32],
     voxels: u32,
+    #[comptime] has_confidence: bool,
     #[comptime] has_color: bool,
     #[comptime] weigh_by_depth: bool,
 ) {
@@ -119,6 +124,9 @@ fn integrate_kernel(
                 if comptime!(weigh_by_depth) {
                     let far = z.max(NEAR_M);
                     weight = 1.0f32 / (far * far);
+                }
+                if comptime!(has_confidence) {
+                    weight *= confidence[at as usize - 1];
                 }
                 let sum = samples[voxel * SAMPLE + 1] + weight;
                 let mean = samples[voxel * SAMPLE];

@@ -4,7 +4,7 @@
 //! For lattice point `p` with camera coordinates `(x, y, z)`, pixel `(u, v)` nearest to its projection and depth
 //! `d = D(u, v)`: `sdf = d - z`. Skipped where `p` is outside the image, nothing was measured, `d` is beyond the maximum
 //! depth or `sdf < -truncation`. Otherwise with `s = min(1, sdf / truncation)` and weight `w`, 1 or
-//! `1 / max(z, 0.5 m)^2`:
+//! `1 / max(z, 0.5 m)^2`, times the pixel's confidence where the image has one:
 //! `S <- (S W + s w) / (W + w)`, `W <- W + w`; colour likewise, with a weight of its own, where `|sdf| <= truncation`.
 
 mod fused;
@@ -18,7 +18,7 @@ use crate::{
 };
 use burn::{
     Tensor,
-    tensor::{DType, TensorData},
+    tensor::{DType, Device, TensorData},
 };
 use glam::Affine3A;
 use mesh::camera::Pinhole;
@@ -68,6 +68,39 @@ impl Camera {
     }
 }
 
+/// One image's pixels on the device, each a row of numbers.
+struct Images {
+    /// Metres, 0 where nothing was measured.
+    depth: Tensor<1>,
+    /// Above 0 and up to 1 wherever something was measured; `None` for 1 everywhere.
+    confidence: Option<Tensor<1>>,
+    /// Three bytes packed in one number: see [`pack_rgb`].
+    color: Option<Tensor<1>>,
+}
+
+impl Images {
+    /// A measurement of confidence 0 goes as none, so that neither form divides by a weight of 0; more than 1 counts as 1.
+    fn upload(view: &DepthView<'_>, rgb: Option<&[u8]>, device: &Device) -> Self {
+        let tensor = |values: Vec<f32>| {
+            let count = values.len();
+            Tensor::<1>::from_data(TensorData::new(values, [count]), (device, DType::F32))
+        };
+        let depth = match view.confidence {
+            Some(_) => (0..view.depth_m.len()).map(|p| view.depth_at(p)).collect(),
+            None => view.depth_m.to_vec(),
+        };
+        let clamped = |values: &[f32]| {
+            let clamp = |&c: &f32| if c > 0.0 { c.min(1.0) } else { 0.0 };
+            values.iter().map(clamp).collect()
+        };
+        Self {
+            depth: tensor(depth),
+            confidence: view.confidence.map(|values| tensor(clamped(values))),
+            color: rgb.map(|rgb| tensor(rgb.chunks_exact(3).map(pack_rgb).collect())),
+        }
+    }
+}
+
 /// Changes the voxels of `bricks`, all of them allocated, by what `view` saw.
 pub(crate) fn integrate(
     form: Form,
@@ -88,23 +121,17 @@ pub(crate) fn integrate(
         color: with_color.map(|(_, camera)| camera),
         rule,
     };
-    let depth = TensorData::new(view.depth_m.to_vec(), [view.depth_m.len()]);
-    let depth = Tensor::<1>::from_data(depth, (&device, DType::F32));
-    let image = with_color.map(|(rgb, _)| {
-        let packed: Vec<f32> = rgb.chunks_exact(3).map(pack_rgb).collect();
-        let count = packed.len();
-        Tensor::<1>::from_data(TensorData::new(packed, [count]), (&device, DType::F32))
-    });
+    let images = Images::upload(view, with_color.map(|(rgb, _)| rgb), &device);
     let records: Vec<i32> = bricks
         .iter()
         .flat_map(|&brick| [lattice.slot(brick), brick.x, brick.y, brick.z])
         .collect();
     match form {
         Form::Plain => {
-            plain::integrate(field, records, &camera, depth, image);
+            plain::integrate(field, records, &camera, &images);
             Ok(())
         }
-        Form::Fused => fused::integrate(field, records, &camera, depth, image),
+        Form::Fused => fused::integrate(field, records, &camera, images),
     }
 }
 

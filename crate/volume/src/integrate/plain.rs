@@ -1,6 +1,6 @@
 //! Integration in tensor operations: the definition that the kernel is checked against, and what CPU devices run.
 
-use super::{BRICK_RECORD, Camera, NEAR_M};
+use super::{BRICK_RECORD, Camera, Images, NEAR_M};
 use crate::{
     field::{COLOR, Field, SAMPLE},
     lattice::BRICK_VOXELS,
@@ -14,25 +14,13 @@ use mesh::camera::Pinhole;
 /// Bricks handled at a time: bounds the memory of the intermediate tensors to some 20 MB.
 const BRICKS_A_BATCH: usize = 512;
 
-pub(super) fn integrate(
-    field: &mut Field,
-    records: Vec<i32>,
-    camera: &Camera,
-    depth: Tensor<1>,
-    image: Option<Tensor<1>>,
-) {
+pub(super) fn integrate(field: &mut Field, records: Vec<i32>, camera: &Camera, images: &Images) {
     for records in records.chunks(BRICKS_A_BATCH * BRICK_RECORD) {
-        integrate_batch(field, records, camera, &depth, image.as_ref());
+        integrate_batch(field, records, camera, images);
     }
 }
 
-fn integrate_batch(
-    field: &mut Field,
-    records: &[i32],
-    camera: &Camera,
-    depth: &Tensor<1>,
-    image: Option<&Tensor<1>>,
-) {
+fn integrate_batch(field: &mut Field, records: &[i32], camera: &Camera, images: &Images) {
     let device = field.device().clone();
     let bricks = records.len() / BRICK_RECORD;
     let slots: Vec<i32> = records.iter().step_by(BRICK_RECORD).copied().collect();
@@ -42,22 +30,25 @@ fn integrate_batch(
 
     let rule = camera.rule;
     let (at, inside) = pixels(&camera.depth, &x, &y, &z);
-    let measured = depth.clone().gather(0, at);
+    let measured = images.depth.clone().gather(0, at.clone());
     let sdf = measured.clone() - z.clone();
     let seen = inside
         .bool_and(measured.clone().greater_elem(0.0))
         .bool_and(measured.lower_equal_elem(rule.max_depth_m))
         .bool_and(sdf.clone().greater_equal_elem(-rule.truncation_m));
     let s = (sdf.clone() / rule.truncation_m).clamp_max(1.0);
-    let weight = if rule.weigh_by_depth {
+    let mut weight = if rule.weigh_by_depth {
         z.clone().clamp_min(NEAR_M).powi_scalar(-2)
     } else {
         z.ones_like()
     };
+    if let Some(confidence) = &images.confidence {
+        weight = weight * confidence.clone().gather(0, at);
+    }
     let step = weight.clone() * seen.clone().float();
     average(&mut field.samples, &slots, SAMPLE, step, &[s]);
 
-    if let (Some(image), Some(color_camera)) = (image, camera.color) {
+    if let (Some(image), Some(color_camera)) = (&images.color, camera.color) {
         let (at, inside) = pixels(&color_camera, &x, &y, &z);
         let near = seen
             .bool_and(inside)
