@@ -1,6 +1,6 @@
 //! Everything that ends a command early, in the words of the room it comes from.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why a command ended early.
 #[derive(Debug, thiserror::Error)]
@@ -30,6 +30,14 @@ pub enum Failure {
     /// The folder or zip cannot be opened.
     #[error(transparent)]
     Source(#[from] scan::SourceError),
+    /// The scan is colour alone.
+    #[error(
+        "expected depth images beside the colour images of {name}, found none; run `ipdrecon stereo`, which needs colour alone"
+    )]
+    NoDepth {
+        /// Name of the scan.
+        name: String,
+    },
     /// The run cannot be planned.
     #[error(transparent)]
     Plan(#[from] recon::PlanError),
@@ -42,6 +50,14 @@ pub enum Failure {
     /// The comparison failed.
     #[error(transparent)]
     Evaluate(#[from] recon::evaluate::EvaluateError),
+    /// A depth map that cannot be written, or is none.
+    #[error("{}: expected a 16-bit grey PNG, {error}", path.display())]
+    Png {
+        /// Which file.
+        path: PathBuf,
+        /// What is wrong with it.
+        error: String,
+    },
     /// A mesh file that is no PLY.
     #[error("{}: {error}", path.display())]
     Ply {
@@ -53,4 +69,15 @@ pub enum Failure {
     /// The result cannot be put into words for programs.
     #[error("the report could not be written as JSON: {0}")]
     Json(#[from] serde_json::Error),
+}
+
+impl Failure {
+    /// The system refused to `action` a file or folder.
+    pub fn file(action: &'static str, path: &Path, error: std::io::Error) -> Self {
+        Self::File {
+            action,
+            path: path.to_owned(),
+            error,
+        }
+    }
 }

@@ -9,7 +9,7 @@ use std::{fs, fs::File, path::Path, rc::Rc};
 /// Opens a folder or a zip as a scan.
 pub fn open_scan(path: &Path) -> Result<Scan, Failure> {
     if path.is_file() {
-        let file = File::open(path).map_err(|error| failed("read", path, error))?;
+        let file = File::open(path).map_err(|error| Failure::file("read", path, error))?;
         return Ok(scan::open(Rc::new(ZipSource::open(file)?))?);
     }
     Ok(scan::open(Rc::new(FolderSource::open(path)?))?)
@@ -17,7 +17,7 @@ pub fn open_scan(path: &Path) -> Result<Scan, Failure> {
 
 /// Reads a PLY.
 pub fn read_mesh(path: &Path) -> Result<Mesh, Failure> {
-    let bytes = fs::read(path).map_err(|error| failed("read", path, error))?;
+    let bytes = fs::read(path).map_err(|error| Failure::file("read", path, error))?;
     ply::read(&bytes).map_err(|error| Failure::Ply {
         path: path.to_owned(),
         error: Box::new(error),
@@ -53,14 +53,6 @@ impl MeshFormat {
             Self::Glb => glb::write(mesh, up),
             Self::Obj => obj::write(mesh),
         };
-        fs::write(path, bytes).map_err(|error| failed("write", path, error))
-    }
-}
-
-fn failed(action: &'static str, path: &Path, error: std::io::Error) -> Failure {
-    Failure::File {
-        action,
-        path: path.to_owned(),
-        error,
+        fs::write(path, bytes).map_err(|error| Failure::file("write", path, error))
     }
 }

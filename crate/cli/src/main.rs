@@ -1,12 +1,15 @@
 //! `ipdrecon`: the engine on the command line. The same `recon` as in the browser, with files at both ends.
 
 mod compute;
+mod depth_folder;
 mod doctor;
 mod eval;
 mod failure;
 mod files;
 mod fuse;
+mod job;
 mod progress;
+mod stereo;
 
 use clap::{Parser, Subcommand};
 use failure::Failure;
@@ -24,7 +27,9 @@ struct Arguments {
 enum Command {
     /// Fuse the depth images of a scan into a mesh.
     Fuse(fuse::Arguments),
-    /// Compare a mesh with ground truth.
+    /// Make depth from the colour images of a scan, and a mesh from that.
+    Stereo(stereo::Arguments),
+    /// Compare a mesh with ground truth, or depth maps with the sensor's depth.
     Eval(eval::Arguments),
     /// Look into a scan and say what is wrong with it.
     Doctor(doctor::Arguments),
@@ -33,6 +38,7 @@ enum Command {
 fn main() -> ExitCode {
     let result: Result<(), Failure> = match Arguments::parse().command {
         Command::Fuse(arguments) => fuse::run(&arguments),
+        Command::Stereo(arguments) => stereo::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
     };

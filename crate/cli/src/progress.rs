@@ -1,23 +1,35 @@
 //! Progress bars: on a terminal only, and on standard error, so that a pipe gets nothing but results.
 
+use crate::{depth_folder::DepthFolder, failure::Failure};
 use indicatif::{ProgressBar, ProgressStyle};
 use recon::{Flow, Sink, Stage};
 use scan::{Finding, Severity};
+use stereo::DepthMap;
 
 /// Shows a run on the terminal.
 pub struct Terminal {
     bar: ProgressBar,
+    maps: Option<DepthFolder>,
+    failed: Option<Failure>,
 }
 
 impl Terminal {
-    /// Shows nothing yet.
-    pub fn new() -> Self {
-        Self { bar: bar("", 0) }
+    /// Shows nothing yet. Depth maps of stereo will be written to `maps`.
+    pub fn new(maps: Option<DepthFolder>) -> Self {
+        Self {
+            bar: bar("", 0),
+            maps,
+            failed: None,
+        }
     }
 
     /// Ends the last bar.
-    pub fn finish(&self) {
+    ///
+    /// # Errors
+    /// A depth map that could not be written, which also stopped the run.
+    pub fn finish(self) -> Result<(), Failure> {
         self.bar.finish_and_clear();
+        self.failed.map_or(Ok(()), Err)
     }
 }
 
@@ -32,9 +44,10 @@ pub fn bar(label: &'static str, total: usize) -> ProgressBar {
 
 impl Sink for Terminal {
     fn stage(&mut self, stage: Stage, total: usize) {
-        self.finish();
+        self.bar.finish_and_clear();
         let label = match stage {
             Stage::WarmingUp => "warming up",
+            Stage::Matching => "matching",
             Stage::Fusing => "fusing",
             Stage::Meshing => "meshing",
         };
@@ -49,8 +62,18 @@ impl Sink for Terminal {
         self.bar.suspend(|| print_finding(&finding));
     }
 
+    fn depth_map(&mut self, map: &DepthMap) {
+        let written = self.maps.as_ref().map(|maps| maps.write(map));
+        if let Some(Err(failure)) = written {
+            self.failed.get_or_insert(failure);
+        }
+    }
+
     async fn checkpoint(&mut self) -> Flow {
-        Flow::Continue
+        match self.failed {
+            Some(_) => Flow::Stop,
+            None => Flow::Continue,
+        }
     }
 }
 

@@ -3,9 +3,10 @@
 use glam::{Affine3A, DVec3, Vec3};
 use mesh::{Mesh, camera::Pinhole};
 use scan::{Camera, ColorImage, DepthImage, Frame, Scan};
+use stereo::DepthMap;
 use volume::DepthView;
 
-/// A frame's pictures as the volume takes them, colour where there is any.
+/// A frame's pictures as the volume takes them, the sensor's depth and colour where there is any.
 pub(crate) fn depth_view<'a>(
     frame: &Frame,
     depth: &'a DepthImage,
@@ -14,6 +15,22 @@ pub(crate) fn depth_view<'a>(
     DepthView {
         depth_m: &depth.depth_m,
         depth_camera: pinhole(&frame.depth_camera),
+        confidence: None,
+        color: color.map(|image| (image.rgb.as_slice(), pinhole(&frame.color_camera))),
+        world_from_camera: pose(frame),
+    }
+}
+
+/// A keyframe's depth that was made from colour, as the volume takes it, with the frame's own picture.
+pub(crate) fn stereo_view<'a>(
+    frame: &Frame,
+    map: &'a DepthMap,
+    color: Option<&'a ColorImage>,
+) -> DepthView<'a> {
+    DepthView {
+        depth_m: &map.depth_m,
+        depth_camera: pinhole(&map.camera),
+        confidence: Some(&map.confidence),
         color: color.map(|image| (image.rgb.as_slice(), pinhole(&frame.color_camera))),
         world_from_camera: pose(frame),
     }

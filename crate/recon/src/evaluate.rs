@@ -183,6 +183,7 @@ fn depth_view<'a>(view: &View, depth_m: &'a [f32]) -> DepthView<'a> {
     DepthView {
         depth_m,
         depth_camera,
+        confidence: None,
         color: None,
         world_from_camera: view.camera_from_world.inverse(),
     }

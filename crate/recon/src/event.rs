@@ -2,14 +2,17 @@
 
 use glam::Vec3;
 use scan::Finding;
+use stereo::DepthMap;
 use volume::{BrickMeshes, VolumeError};
 
-/// The stages of a run, in order.
+/// The stages of a run, in order; a run has either [`Stage::Matching`] or [`Stage::Fusing`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// Kernels are compiled.
     WarmingUp,
-    /// Depth becomes a volume; counted in keyframes.
+    /// Colour becomes depth, and depth a volume; counted in keyframes that were matched with their neighbours.
+    Matching,
+    /// The sensor's depth becomes a volume; counted in keyframes.
     Fusing,
     /// The last bricks of the mesh are made; counted in bricks.
     Meshing,
@@ -34,6 +37,9 @@ pub trait Sink {
 
     /// Something about a frame that the user should know; the run goes on without it.
     fn finding(&mut self, _finding: Finding) {}
+
+    /// A keyframe's depth was made from colour; it is fused next.
+    fn depth_map(&mut self, _map: &DepthMap) {}
 
     /// Where bricks are wanted first, in the canonical world; `None` for no streaming: the mesh is then taken at the end.
     fn eye(&self) -> Option<Vec3> {

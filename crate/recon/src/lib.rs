@@ -9,5 +9,5 @@ mod run;
 
 pub use convert::{pinhole, place, pose};
 pub use event::{Flow, Sink, Stage};
-pub use plan::{Limits, Options, Plan, PlanError, plan};
+pub use plan::{DepthSource, Limits, Options, Plan, PlanError, plan};
 pub use run::{Outcome, RunError, run};

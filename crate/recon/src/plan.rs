@@ -1,41 +1,22 @@
 //! What fits, said before any work: frames, bricks, bytes, and what was turned down and why.
 
-use crate::convert::depth_view;
-use glam::IVec3;
-use scan::{KeyframeRule, Scan, keyframes};
-use std::collections::HashMap;
-use volume::{BYTES_PER_BRICK, VolumeConfig};
+mod bricks;
+mod options;
 
-/// Keyframes whose depth is looked at to foretell the size of the volume.
-const SAMPLED_KEYFRAMES: usize = 16;
+use bricks::Foresight;
+pub use options::{DepthSource, Options};
+use scan::{Camera, Frame, KeyframeRule, Scan, keyframes};
+use stereo::{StereoConfig, StereoError};
+use volume::{BYTES_PER_BRICK, SurfaceRule, VolumeConfig};
+
 /// A voxel is made this much larger at a time until the volume fits.
 const COARSER: f32 = 1.25;
 /// Share of the limit that the estimate may reach: it is an estimate.
 const MARGIN: f64 = 0.8;
 /// Bytes a vertex of the drawn surface takes, and triangles a brick has on average: measured on furnished rooms.
 const TRIANGLES_PER_BRICK: usize = 75;
-
-/// What the user asks for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
-    /// Edge of a voxel in metres.
-    pub voxel_size_m: f32,
-    /// Take every n-th keyframe; at least 1.
-    pub every: usize,
-    /// Depth beyond this is not used, in metres.
-    pub max_depth_m: f32,
-}
-
-impl Default for Options {
-    /// 4 cm voxels, every keyframe, depth up to 5 m.
-    fn default() -> Self {
-        Self {
-            voxel_size_m: 0.04,
-            every: 1,
-            max_depth_m: 5.0,
-        }
-    }
-}
+/// Pictures that stereo keeps at its working size.
+const STEREO_PICTURES: usize = 48;
 
 /// What the machine allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,13 +39,15 @@ impl Default for Limits {
 pub struct Plan {
     /// What the user asked for, with a larger voxel if that one did not fit.
     pub options: Options,
+    /// Where depth comes from, decided.
+    pub depth: DepthSource,
     /// Usable frames of the scan.
     pub frames: usize,
     /// The frames that will be fused, as indices into the scan's.
     pub keyframes: Vec<usize>,
-    /// Bricks expected.
+    /// Bricks expected; where depth is not there yet, no more than this many.
     pub bricks: usize,
-    /// Bytes expected on the device: the field with room to grow, and the surface.
+    /// Bytes expected on the device: the field with room to grow, the surface, and what stereo works on.
     pub device_bytes: usize,
     /// Bytes expected on the heap: decoded pictures and what waits for the device.
     pub heap_bytes: usize,
@@ -77,14 +60,25 @@ pub struct Plan {
 /// Why there is no plan.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
-    /// The scan has no depth.
+    /// The sensor's depth was asked for, and the scan has none.
     #[error(
         "expected depth images beside the colour images of {name}, found none; \
-         fusion needs a scan from an RGB-D camera or a phone with a depth sensor"
+         fusion needs a scan from an RGB-D camera or a phone with a depth sensor: use stereo for colour alone"
     )]
     NoDepth {
         /// Name of the scan.
         name: String,
+    },
+    /// Neither depth nor enough colour.
+    #[error(
+        "expected colour images in at least 2 keyframes of {name} to make depth from, found {found}; \
+         give a scan with depth images, or with more colour images from different places"
+    )]
+    TooFewPictures {
+        /// Name of the scan.
+        name: String,
+        /// Keyframes with colour.
+        found: usize,
     },
     /// A setting that makes no sense.
     #[error("expected {what}, found {found}")]
@@ -94,37 +88,49 @@ pub enum PlanError {
         /// What was given.
         found: String,
     },
+    /// A setting of stereo that makes no sense.
+    #[error(transparent)]
+    Stereo(#[from] StereoError),
 }
 
-/// Plans a run: chooses keyframes, foretells the size of the volume from some of them, and makes the voxels larger if
-/// it would not fit.
+/// Plans a run: decides where depth comes from, chooses keyframes, foretells the size of the volume from the depth of
+/// some of them or from the cameras alone, and makes the voxels larger if it would not fit.
 ///
 /// # Errors
-/// No depth, or settings that make no sense.
+/// Neither depth nor two pictures in colour, or settings that make no sense.
 pub fn plan(scan: &Scan, limits: &Limits, options: Options) -> Result<Plan, PlanError> {
-    check(&options)?;
-    if !scan.has_depth() {
-        return Err(PlanError::NoDepth {
-            name: scan.name().to_owned(),
-        });
-    }
+    options.check()?;
+    let depth = options.depth_source(scan)?;
     let frames = scan.frames();
+    let usable = |frame: &usize| match depth {
+        DepthSource::Sensor => frames[*frame].depth.is_some(),
+        DepthSource::Stereo(_) => frames[*frame].color.is_some(),
+    };
     let kept = keyframes(frames, KeyframeRule::default());
-    let kept = kept
-        .into_iter()
-        .filter(|&frame| frames[frame].depth.is_some());
-    let keyframes: Vec<usize> = kept.step_by(options.every).collect();
+    let keyframes = options.chosen(kept.into_iter().filter(usable));
+    let foresight = match depth {
+        DepthSource::Sensor => Foresight::from_depth(scan, &keyframes),
+        DepthSource::Stereo(_) if keyframes.len() < 2 => {
+            return Err(PlanError::TooFewPictures {
+                name: scan.name().to_owned(),
+                found: keyframes.len(),
+            });
+        }
+        DepthSource::Stereo(config) => {
+            let far_m = config.far_m.min(options.max_depth_m);
+            Foresight::from_cameras(scan, &keyframes, f64::from(far_m))
+        }
+    };
 
-    let samples = sample_depths(scan, &keyframes);
     let laid_out = |voxel_size_m: f32| {
         let volume = VolumeConfig {
             max_depth_m: options.max_depth_m,
             color: scan.has_color(),
             binding_bytes: limits.binding_bytes,
+            surface: surface_rule(&depth),
             ..VolumeConfig::new(voxel_size_m)
         };
-        let bricks = estimate(scan, &volume, &samples, keyframes.len());
-        (volume, bricks)
+        (volume, foresight.bricks(scan, &volume))
     };
     let fits = |(volume, bricks): &(VolumeConfig, usize)| {
         (*bricks as f64) < volume.brick_limit() as f64 * MARGIN
@@ -149,17 +155,20 @@ pub fn plan(scan: &Scan, limits: &Limits, options: Options) -> Result<Plan, Plan
         voxel_size_m: volume.voxel_size_m,
         ..options
     };
-    let picture_bytes = keyframes
-        .iter()
-        .map(|&frame| picture_bytes(&frames[frame]))
-        .max();
+    let fusion = 2 * bricks * BYTES_PER_BRICK
+        + bricks * TRIANGLES_PER_BRICK * 3 * mesh::soup::VERTEX_STRIDE_BYTES as usize;
+    let stereo = match &depth {
+        DepthSource::Sensor => Bytes::default(),
+        DepthSource::Stereo(config) => stereo_bytes(scan, &keyframes, config),
+    };
+    let pictures = keyframes.iter().map(|&f| picture_bytes(&frames[f], &depth));
     Ok(Plan {
         options,
+        depth,
         frames: frames.len(),
-        device_bytes: 2 * bricks * BYTES_PER_BRICK
-            + bricks * TRIANGLES_PER_BRICK * 3 * mesh::soup::VERTEX_STRIDE_BYTES as usize,
+        device_bytes: fusion + stereo.device,
         // The file, its pixels, and the copy on its way to the device.
-        heap_bytes: 3 * picture_bytes.unwrap_or(0),
+        heap_bytes: 3 * pictures.max().unwrap_or(0) + stereo.heap,
         keyframes,
         bricks,
         remarks,
@@ -167,60 +176,46 @@ pub fn plan(scan: &Scan, limits: &Limits, options: Options) -> Result<Plan, Plan
     })
 }
 
-fn check(options: &Options) -> Result<(), PlanError> {
-    let fault = |what, found: String| Err(PlanError::Setting { what, found });
-    if !(0.004..=1.0).contains(&options.voxel_size_m) {
-        let found = format!("{} m", options.voxel_size_m);
-        return fault("a voxel size between 0.004 and 1 m", found);
+/// Which cells may have a surface. The one place where stereo's depth may be judged otherwise than a sensor's.
+fn surface_rule(depth: &DepthSource) -> SurfaceRule {
+    let usual = VolumeConfig::new(0.04).surface;
+    match depth {
+        DepthSource::Sensor => usual,
+        // The same least weight: a pixel of confidence 1/2 needs a second one to agree where a sure one stands alone.
+        DepthSource::Stereo(_) => usual,
     }
-    if !(0.1..=100.0).contains(&options.max_depth_m) {
-        let found = format!("{} m", options.max_depth_m);
-        return fault("a maximum depth between 0.1 and 100 m", found);
-    }
-    if options.every == 0 {
-        return fault("to take every 1st, 2nd, 3rd … keyframe", "every 0th".into());
-    }
-    Ok(())
 }
 
-fn picture_bytes(frame: &scan::Frame) -> usize {
-    let pixels = |camera: &scan::Camera| camera.width as usize * camera.height as usize;
-    let color = frame
-        .color
-        .as_ref()
-        .map_or(0, |_| pixels(&frame.color_camera) * 7);
-    color + pixels(&frame.depth_camera) * 4
+fn pixels(camera: &Camera) -> usize {
+    camera.width as usize * camera.height as usize
 }
 
-/// Depth of some keyframes, evenly spread; those that cannot be decoded are left out here and reported by the run.
-fn sample_depths(scan: &Scan, keyframes: &[usize]) -> Vec<(usize, scan::DepthImage)> {
-    let step = keyframes.len().div_ceil(SAMPLED_KEYFRAMES).max(1);
-    let chosen = keyframes.iter().step_by(step);
-    chosen
-        .filter_map(|&frame| Some((frame, scan.depth(frame).ok()??)))
-        .collect()
+fn picture_bytes(frame: &Frame, depth: &DepthSource) -> usize {
+    let color = frame.color.as_ref();
+    let color = color.map_or(0, |_| pixels(&frame.color_camera) * 7);
+    match depth {
+        DepthSource::Sensor => color + pixels(&frame.depth_camera) * 4,
+        DepthSource::Stereo(_) => color,
+    }
 }
 
-/// Bricks that all keyframes together need. What the sampled ones need is counted; what the others add is foretold by
-/// Chao's estimator of unseen species (Chao 1987): from bricks that one sample needs (`q1`) and that two need (`q2`).
-fn estimate(
-    scan: &Scan,
-    volume: &VolumeConfig,
-    samples: &[(usize, scan::DepthImage)],
-    keyframes: usize,
-) -> usize {
-    let mut uses: HashMap<IVec3, usize> = HashMap::new();
-    for (frame, depth) in samples {
-        let view = depth_view(&scan.frames()[*frame], depth, None);
-        for brick in volume.bricks_of(&view) {
-            *uses.entry(brick).or_default() += 1;
-        }
+#[derive(Default)]
+struct Bytes {
+    device: usize,
+    heap: usize,
+}
+
+/// What stereo works on: a cost for each pixel and plane, before and after smoothing, and the pictures it keeps, with
+/// depth and confidence beside each.
+fn stereo_bytes(scan: &Scan, keyframes: &[usize], config: &StereoConfig) -> Bytes {
+    let (width, height) = config.size;
+    let working = keyframes.iter().map(|&frame| {
+        let camera = &scan.frames()[frame].color_camera;
+        pixels(camera).min(width as usize * height as usize)
+    });
+    let working = working.max().unwrap_or(0);
+    Bytes {
+        device: 2 * working * config.planes * size_of::<f32>(),
+        heap: keyframes.len().min(STEREO_PICTURES) * working * 4 * size_of::<f32>(),
     }
-    let seen = uses.len();
-    if samples.len() >= keyframes {
-        return seen;
-    }
-    let used = |times| uses.values().filter(|&&n| n == times).count() as f64;
-    let (q1, q2) = (used(1), used(2));
-    seen + (q1 * q1 / (2.0 * q2.max(1.0))) as usize
 }

@@ -1,14 +1,18 @@
-//! The run: keyframe by keyframe into the volume, and brick by brick out of it.
+//! The run: keyframe by keyframe into the volume, and brick by brick out of it. Each source of depth has a file of its
+//! own; what they share is here.
+
+mod sensor;
+mod stereo;
 
 use crate::{
-    convert::depth_view,
     event::{Flow, Sink, Stage},
-    plan::Plan,
+    plan::{DepthSource, Plan},
 };
+use ::stereo::StereoError;
 use burn::tensor::Device;
 use glam::{Affine3A, Vec3};
 use mesh::camera::Pinhole;
-use scan::{FrameError, Scan};
+use scan::{ColorImage, Scan};
 use volume::{DepthView, Volume, VolumeError};
 
 /// Bricks handed over at a time. Small, so that the picture stays alive between them.
@@ -22,7 +26,10 @@ pub enum RunError {
     /// The volume failed.
     #[error(transparent)]
     Volume(#[from] VolumeError),
-    /// Not one depth image could be used.
+    /// Stereo failed.
+    #[error(transparent)]
+    Stereo(#[from] StereoError),
+    /// Not one depth image could be used or made.
     #[error(
         "expected depth in {keyframes} keyframes, found none that can be used; the findings say what is wrong with each"
     )]
@@ -44,10 +51,12 @@ pub struct Outcome {
 
 /// Runs a plan on a device.
 ///
-/// Frames whose pictures cannot be decoded are reported and left out. A frame without usable colour still gives depth.
+/// Frames whose pictures cannot be decoded are reported and left out. A frame without usable colour still gives the
+/// sensor's depth. A volume that outgrows its limit ends the run, but for stereo: that ends fusing with a finding, for its
+/// size could only be guessed.
 ///
 /// # Errors
-/// A failing device, a volume that outgrows its limit, or not one usable depth image.
+/// A failing device, a volume that outgrows its limit, pictures without parallax, or not one usable depth image.
 pub async fn run(
     scan: &Scan,
     plan: &Plan,
@@ -57,40 +66,35 @@ pub async fn run(
     sink.stage(Stage::WarmingUp, 1);
     warm_up(plan, device).await?;
     sink.progress(1);
-    let mut outcome = Outcome {
+    let mut fusion = Fusion {
         volume: plan.volume.init(device)?,
-        frames_fused: 0,
+        frames: 0,
+        next_surface: 1,
         stopped: false,
     };
-    sink.stage(Stage::Fusing, plan.keyframes.len());
-    let mut next_surface = 1;
-    for (done, &frame) in plan.keyframes.iter().enumerate() {
-        if sink.checkpoint().await == Flow::Stop {
-            outcome.stopped = true;
-            break;
+    match &plan.depth {
+        DepthSource::Sensor => sensor::fuse(scan, &plan.keyframes, &mut fusion, sink).await?,
+        DepthSource::Stereo(config) => {
+            stereo::fuse(scan, &plan.keyframes, config, &mut fusion, sink).await?;
         }
-        if fuse(scan, frame, &mut outcome.volume, sink)? {
-            outcome.frames_fused += 1;
-        }
-        // The first surface at once, then after twice as many frames until the usual distance is reached.
-        if outcome.frames_fused == next_surface {
-            next_surface += next_surface.min(KEYFRAMES_A_SURFACE);
-            hand_over(&mut outcome, sink, |_, _| ()).await?;
-        }
-        sink.progress(done + 1);
     }
-    if outcome.frames_fused == 0 && !outcome.stopped {
+    if fusion.frames == 0 && !fusion.stopped {
         return Err(RunError::NothingFused {
             keyframes: plan.keyframes.len(),
         });
     }
-    let left = outcome.volume.changed_count();
+    let left = fusion.volume.changed_count();
     sink.stage(Stage::Meshing, left);
-    hand_over(&mut outcome, sink, |sink, waiting| {
-        sink.progress(left - waiting.min(left));
+    fusion
+        .hand_over(sink, |sink, waiting| {
+            sink.progress(left - waiting.min(left));
+        })
+        .await?;
+    Ok(Outcome {
+        volume: fusion.volume,
+        frames_fused: fusion.frames,
+        stopped: fusion.stopped,
     })
-    .await?;
-    Ok(outcome)
 }
 
 /// Compiles the kernels on a volume of one tiny view, so that the wait has a name and later steps are even.
@@ -103,10 +107,15 @@ async fn warm_up(plan: &Plan, device: &Device) -> Result<(), RunError> {
         cx: 0.5,
         cy: 0.5,
     };
+    let sure = [1.0; 4];
     let mut volume = plan.volume.init(device)?;
     volume.integrate(&DepthView {
         depth_m: &[plan.options.max_depth_m * 0.5; 4],
         depth_camera: camera,
+        confidence: match plan.depth {
+            DepthSource::Sensor => None,
+            DepthSource::Stereo(_) => Some(&sure),
+        },
         color: plan.volume.color.then_some((&[0; 12], camera)),
         world_from_camera: Affine3A::IDENTITY,
     })?;
@@ -114,53 +123,58 @@ async fn warm_up(plan: &Plan, device: &Device) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Takes one frame into the volume; whether it had depth that could be used.
-fn fuse(
-    scan: &Scan,
-    frame: usize,
-    volume: &mut Volume,
-    sink: &mut impl Sink,
-) -> Result<bool, RunError> {
-    let report = |error: FrameError| error.finding().clone();
-    let depth = match scan.depth(frame) {
-        Ok(Some(depth)) => depth,
-        Ok(None) => return Ok(false),
+/// A frame's colour picture, if it has one; one that cannot be decoded is reported and the frame goes without.
+fn color(scan: &Scan, frame: usize, sink: &mut impl Sink) -> Option<ColorImage> {
+    scan.frames()[frame].color.as_ref()?;
+    match scan.color(frame) {
+        Ok(color) => Some(color),
         Err(error) => {
-            sink.finding(report(error));
-            return Ok(false);
-        }
-    };
-    let info = &scan.frames()[frame];
-    let color = match info.color.as_ref().map(|_| scan.color(frame)) {
-        Some(Ok(color)) => Some(color),
-        Some(Err(error)) => {
-            sink.finding(report(error));
+            sink.finding(error.finding().clone());
             None
         }
-        None => None,
-    };
-    volume.integrate(&depth_view(info, &depth, color.as_ref()))?;
-    Ok(true)
+    }
 }
 
-/// Hands the changed bricks over, nearest to the eye first, unless nobody watches. `told` hears how many still wait.
-async fn hand_over<S: Sink>(
-    outcome: &mut Outcome,
-    sink: &mut S,
-    told: impl Fn(&mut S, usize),
-) -> Result<(), RunError> {
-    let Some(mut eye) = sink.eye() else {
-        return Ok(());
-    };
-    while outcome.volume.changed_count() > 0 {
-        let bricks = outcome.volume.take_changed(BRICKS_A_STEP, eye);
-        let meshes = outcome.volume.extract(&bricks).await?;
-        sink.bricks(meshes).await?;
-        told(sink, outcome.volume.changed_count());
-        if sink.checkpoint().await == Flow::Stop {
-            outcome.stopped = true;
+/// The volume as it fills, and when its surface is next handed over.
+struct Fusion {
+    volume: Volume,
+    frames: usize,
+    next_surface: usize,
+    stopped: bool,
+}
+
+impl Fusion {
+    /// Takes one depth image in, and hands the surface over: the first at once, then after twice as many frames until
+    /// the usual distance is reached.
+    async fn take(&mut self, view: &DepthView<'_>, sink: &mut impl Sink) -> Result<(), RunError> {
+        self.volume.integrate(view)?;
+        self.frames += 1;
+        if self.frames == self.next_surface {
+            self.next_surface += self.next_surface.min(KEYFRAMES_A_SURFACE);
+            self.hand_over(sink, |_, _| ()).await?;
         }
-        eye = sink.eye().unwrap_or(Vec3::ZERO);
+        Ok(())
     }
-    Ok(())
+
+    /// Hands the changed bricks over, nearest to the eye first, unless nobody watches. `told` hears how many still wait.
+    async fn hand_over<S: Sink>(
+        &mut self,
+        sink: &mut S,
+        told: impl Fn(&mut S, usize),
+    ) -> Result<(), RunError> {
+        let Some(mut eye) = sink.eye() else {
+            return Ok(());
+        };
+        while self.volume.changed_count() > 0 {
+            let bricks = self.volume.take_changed(BRICKS_A_STEP, eye);
+            let meshes = self.volume.extract(&bricks).await?;
+            sink.bricks(meshes).await?;
+            told(sink, self.volume.changed_count());
+            if sink.checkpoint().await == Flow::Stop {
+                self.stopped = true;
+            }
+            eye = sink.eye().unwrap_or(Vec3::ZERO);
+        }
+        Ok(())
+    }
 }

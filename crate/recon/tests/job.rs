@@ -9,7 +9,7 @@ use burn::tensor::Device;
 use common::{Recorder, SEED, open, sample};
 use glam::Vec3;
 use mesh::Mesh;
-use recon::{Limits, Options, Stage};
+use recon::{DepthSource, Limits, Options, Stage};
 use scan::{MemorySource, Scan, Source};
 use synth::Room;
 
@@ -227,7 +227,11 @@ fn nonsense_and_scans_without_depth_are_refused_in_words() {
     let color_only = open(files(|path, bytes| {
         (!path.contains("depth")).then_some(bytes)
     }));
-    let error = recon::plan(&color_only, &Limits::default(), Options::default())
+    let sensor = Options {
+        depth: Some(DepthSource::Sensor),
+        ..Options::default()
+    };
+    let error = recon::plan(&color_only, &Limits::default(), sensor)
         .unwrap_err()
         .to_string();
     assert!(
