@@ -1,5 +1,5 @@
 /** Says what goes on: every change to the eye, and to the ear only as often as one can listen. */
-import type { Event as EngineEvent, StageName } from "./engine.js";
+import type { Event as EngineEvent, PlanSummary, StageName } from "./engine.js";
 import { count, counted, stageTitle } from "./words.js";
 
 /** Progress is spoken at each of these shares of the work. */
@@ -22,7 +22,7 @@ export class Announcer {
         this.#both(`Opened ${event.name}: ${event.format}, ${counted(event.frames, "frame")}.`);
         break;
       case "planned":
-        this.#both(`Planned: ${count(event.plan.keyframes)} of ${counted(event.plan.frames, "frame")} kept.`);
+        this.#both(planned(event.plan));
         break;
       case "stage":
         this.#stage = event.stage;
@@ -68,4 +68,9 @@ export class Announcer {
     this.status.textContent = words;
     this.caption.textContent = words;
   }
+}
+
+function planned({ keyframes, frames, depth }: PlanSummary): string {
+  const source = depth === "stereo" ? ", depth will be estimated from the pictures" : "";
+  return `Planned: ${count(keyframes)} of ${counted(frames, "frame")} kept${source}.`;
 }

@@ -186,7 +186,7 @@ function nothingIn(name: string, unreadable: Unreadable[]): DropError {
   if (first) return unread(first.path, first.reason, unreadable);
   return name === "the dropped files"
     ? new DropError("Nothing that can be opened was dropped.", "Drop the folder of the scan, or a .zip of it.")
-    : new DropError(`“${name}” is empty.`, "Drop the folder that holds the photos, the depth images and the poses, or a .zip of it.");
+    : new DropError(`“${name}” is empty.`, "Drop the folder that holds the photos and their poses, or a .zip of it.");
 }
 
 function unread(path: string, cause: unknown, unreadable: Unreadable[] = []): DropError {

@@ -38,7 +38,8 @@ export interface IpdReconElement {
 
 /**
  * Attributes: `theme` (`light`, `dark`; otherwise the system's), `shading` (`color`, `normal`, `wireframe`, `depth`), `cameras`,
- * `back-faces`, `review` (wait after the plan), `voxel-size` and `max-depth` (metres), `every` (n-th keyframe), `label` (what
+ * `back-faces`, `review` (wait after the plan), `voxel-size` and `max-depth` (metres), `every` (n-th keyframe), `views` (so many
+ * keyframes, spread evenly), `depth` (`sensor`, `stereo`; otherwise what the scan has), `stereo-size` (`320x240`), `label` (what
  * screen readers call it); and, read when it is put into the page, `device` (`cpu`) and `worker-src`.
  */
 export class IpdReconElement extends HTMLElement {
@@ -183,7 +184,16 @@ export class IpdReconElement extends HTMLElement {
       const value = Number.parseFloat(this.getAttribute(name) ?? "");
       return value > 0 ? value : undefined;
     };
-    const all = { voxelSizeM: number("voxel-size"), every: number("every"), maxDepthM: number("max-depth") };
+    const depth = this.getAttribute("depth");
+    const [, width, height] = /^(\d+)x(\d+)$/.exec(this.getAttribute("stereo-size") ?? "") ?? [];
+    const all: Partial<RunOptions> = {
+      voxelSizeM: number("voxel-size"),
+      every: number("every"),
+      views: number("views"),
+      maxDepthM: number("max-depth"),
+      depth: depth === "sensor" || depth === "stereo" ? depth : undefined,
+      stereoSize: width && height ? { widthPx: Number(width), heightPx: Number(height) } : undefined,
+    };
     return Object.fromEntries(Object.entries(all).filter(([, value]) => value !== undefined));
   }
 

@@ -8,14 +8,16 @@ export * from "./client.js";
 export { collect, DropError, type Droppable, type Dropped, type Unreadable } from "./drop.js";
 export { defineIpdRecon, IpdReconElement, type IpdReconEventMap, type OpenOptions } from "./element.js";
 export { preflight, type Shortcoming } from "./preflight.js";
-export { count, counted, STAGE_ORDER, stageTitle } from "./words.js";
+export { count, counted, stageOrder, stageTitle } from "./words.js";
 export type {
+  DepthSource,
   DeviceChoice,
   Event as EngineEvent,
   FindingMessage,
   InputEvent,
   LookAt,
   MeshFormat,
+  PixelSize,
   PlanSummary,
   Request as EngineRequest,
   RunOptions,

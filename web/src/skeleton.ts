@@ -43,7 +43,7 @@ export function skeleton(root: ShadowRoot): Parts {
   const parts = { stage: part("stage"), empty: part("empty"), caption: part("caption"), status: part("status") };
   const slot = document.createElement("slot");
   slot.name = "empty";
-  slot.textContent = "Drop a folder of posed photos with depth here, or a .zip of it.";
+  slot.textContent = "Drop a folder of posed photos here, or a .zip of it.";
   parts.empty.append(slot);
   parts.caption.setAttribute("aria-hidden", "true");
   parts.status.setAttribute("role", "status");

@@ -1,15 +1,18 @@
 /** What the engine's events are called in front of people: on the page, in the caption and by the announcer. */
-import type { StageName } from "./engine.js";
+import type { DepthSource, StageName } from "./engine.js";
 
 const STAGES: Record<StageName, string> = {
   opening: "Reading the scan",
   warmingUp: "Warming up",
+  matching: "Matching views",
   fusing: "Fusing depth",
   meshing: "Finishing the mesh",
 };
 
 /** The stages in the order in which they come. */
-export const STAGE_ORDER: readonly StageName[] = ["opening", "warmingUp", "fusing", "meshing"];
+export function stageOrder(depth: DepthSource = "sensor"): readonly StageName[] {
+  return ["opening", "warmingUp", depth === "stereo" ? "matching" : "fusing", "meshing"];
+}
 
 /** A stage in words. */
 export function stageTitle(stage: StageName): string {

@@ -1,31 +1,61 @@
 //! Between the messages and the rooms' own types.
 
 use crate::messages::{
-    FindingMessage, InputEvent, PlanSummary, RunOptions, ShadingMode, StageName, ViewOptions,
+    DepthSource, FindingMessage, InputEvent, PixelSize, PlanSummary, RunOptions, ShadingMode,
+    StageName, ViewOptions,
 };
 use recon::{Options, Plan, Stage};
 use scan::{Finding, Gravity, GravitySource};
+use stereo::StereoConfig;
 use view::{Input, Look, PointerKind, Shading, Theme};
 
 pub fn options(message: RunOptions) -> Options {
     Options {
         voxel_size_m: message.voxel_size_m,
         every: message.every as usize,
+        views: message.views.map(|views| views as usize),
         max_depth_m: message.max_depth_m,
+        depth: message.depth.map(|source| match source {
+            DepthSource::Sensor => recon::DepthSource::Sensor,
+            DepthSource::Stereo => recon::DepthSource::Stereo(StereoConfig {
+                size: (message.stereo_size.width_px, message.stereo_size.height_px),
+                ..StereoConfig::default()
+            }),
+        }),
     }
 }
 
-pub fn run_options(options: Options) -> RunOptions {
+/// What a plan was made with, as the page would ask for it again.
+pub fn run_options(plan: &Plan) -> RunOptions {
+    let options = &plan.options;
+    let (width_px, height_px) = match plan.depth {
+        recon::DepthSource::Sensor => StereoConfig::default().size,
+        recon::DepthSource::Stereo(config) => config.size,
+    };
     RunOptions {
         voxel_size_m: options.voxel_size_m,
         every: options.every as u32,
+        views: options.views.map(|views| views as u32),
         max_depth_m: options.max_depth_m,
+        depth: Some(depth_source(plan.depth)),
+        stereo_size: PixelSize {
+            width_px,
+            height_px,
+        },
+    }
+}
+
+fn depth_source(source: recon::DepthSource) -> DepthSource {
+    match source {
+        recon::DepthSource::Sensor => DepthSource::Sensor,
+        recon::DepthSource::Stereo(_) => DepthSource::Stereo,
     }
 }
 
 pub fn plan_summary(plan: &Plan) -> PlanSummary {
     PlanSummary {
-        options: run_options(plan.options),
+        options: run_options(plan),
+        depth: depth_source(plan.depth),
         frames: plan.frames as u32,
         keyframes: plan.keyframes.len() as u32,
         bricks: plan.bricks as u32,
@@ -38,6 +68,7 @@ pub fn plan_summary(plan: &Plan) -> PlanSummary {
 pub fn stage_name(stage: Stage) -> StageName {
     match stage {
         Stage::WarmingUp => StageName::WarmingUp,
+        Stage::Matching => StageName::Matching,
         Stage::Fusing => StageName::Fusing,
         Stage::Meshing => StageName::Meshing,
     }

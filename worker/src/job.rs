@@ -9,9 +9,10 @@ use crate::{
 };
 use glam::Vec3;
 use js_sys::{Promise, Uint8Array};
-use recon::{Flow, Options, Sink, Stage};
+use recon::{DepthSource, Flow, Options, RunError, Sink, Stage};
 use scan::{Finding, Scan, ScanError, Source, ZipSource};
 use std::rc::Rc;
+use stereo::StereoError;
 use view::CameraPose;
 use volume::{BrickMeshes, VolumeError};
 use wasm_bindgen::JsValue;
@@ -108,6 +109,7 @@ fn opened(engine: &Rc<Engine>, scan: Scan) {
         format: scan.format().to_string(),
         frames: scan.frames().len() as u32,
         has_depth: scan.has_depth(),
+        has_color: scan.has_color(),
         gravity: convert::gravity(scan.gravity()),
     });
     for finding in scan.findings() {
@@ -129,10 +131,13 @@ pub fn plan(engine: &Rc<Engine>, options: Options) -> bool {
             engine.emit(&Event::Planned {
                 plan: convert::plan_summary(&plan),
             });
-            let frames = scan.frames();
-            let poses = plan.keyframes.iter().map(|&frame| CameraPose {
-                world_from_camera: recon::pose(&frames[frame]),
-                pinhole: recon::pinhole(&frames[frame].depth_camera),
+            let frames = plan.keyframes.iter().map(|&frame| &scan.frames()[frame]);
+            let poses = frames.map(|frame| CameraPose {
+                world_from_camera: recon::pose(frame),
+                pinhole: recon::pinhole(match plan.depth {
+                    DepthSource::Sensor => &frame.depth_camera,
+                    DepthSource::Stereo(_) => &frame.color_camera,
+                }),
             });
             engine.set_cameras(&poses.collect::<Vec<_>>());
             engine.set_plan(plan);
@@ -150,9 +155,8 @@ pub fn plan(engine: &Rc<Engine>, options: Options) -> bool {
 /// Runs the plan.
 pub async fn run(engine: Rc<Engine>, options: RunOptions) {
     engine.stop_and_wait().await;
-    let options = convert::options(options);
-    let current = engine.plan().is_some_and(|plan| plan.options == options);
-    if !current && !plan(&engine, options) {
+    let planned = engine.plan().map(|plan| convert::run_options(&plan));
+    if planned != Some(options) && !plan(&engine, convert::options(options)) {
         return;
     }
     let (Some(scan), Some(plan)) = (engine.scan(), engine.plan()) else {
@@ -186,9 +190,9 @@ pub async fn run(engine: Rc<Engine>, options: RunOptions) {
             let text = error.to_string();
             let (message, advice) = text.split_once("; ").unwrap_or((&text, ""));
             let code = match error {
-                recon::RunError::Volume(VolumeError::TooManyBricks { .. }) => "memory",
-                recon::RunError::Volume(_) => "device",
-                recon::RunError::NothingFused { .. } => "scan",
+                RunError::Volume(VolumeError::TooManyBricks { .. }) => "memory",
+                RunError::Volume(_) | RunError::Stereo(StereoError::Device(_)) => "device",
+                RunError::Stereo(_) | RunError::NothingFused { .. } => "scan",
             };
             engine.fail(code, message.to_owned(), advice.to_owned());
         }

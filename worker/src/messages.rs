@@ -104,8 +104,36 @@ pub struct RunOptions {
     pub voxel_size_m: f32,
     /// Take every n-th keyframe; 1 by default.
     pub every: u32,
+    /// At most this many keyframes, spread evenly over those that `every` leaves; all of them by default.
+    #[serde(default)]
+    pub views: Option<u32>,
     /// Depth beyond this is not used, metres.
     pub max_depth_m: f32,
+    /// Where depth comes from; left out, from the sensor where the scan has depth, otherwise from the pictures.
+    #[serde(default)]
+    pub depth: Option<DepthSource>,
+    /// With stereo, pictures are scaled down to fit into this; 320 by 240 by default.
+    pub stereo_size: PixelSize,
+}
+
+/// Where depth comes from.
+#[derive(Serialize, Deserialize, Tsify, Clone, Copy, Debug, PartialEq, Eq)]
+#[serde(rename_all = "camelCase")]
+pub enum DepthSource {
+    /// The depth images of the scan.
+    Sensor,
+    /// The colour pictures and their poses: what one sees is looked for in its neighbours.
+    Stereo,
+}
+
+/// Width and height.
+#[derive(Serialize, Deserialize, Tsify, Clone, Copy, Debug, PartialEq, Eq)]
+#[serde(rename_all = "camelCase")]
+pub struct PixelSize {
+    /// Pixels.
+    pub width_px: u32,
+    /// Pixels.
+    pub height_px: u32,
 }
 
 /// A file of the mesh.
@@ -265,6 +293,8 @@ pub enum Event {
         frames: u32,
         /// Whether depth was recorded.
         has_depth: bool,
+        /// Whether colour was recorded.
+        has_color: bool,
         /// How up was found, in words.
         gravity: String,
     },
@@ -275,7 +305,7 @@ pub enum Event {
     },
     /// A stage began.
     Stage {
-        /// `opening`, `warmingUp`, `fusing`, `meshing`.
+        /// `opening`, `warmingUp`, then `fusing` (the sensor's depth) or `matching` (stereo), `meshing`.
         stage: StageName,
     },
     /// A count of known work within the stage.
@@ -351,11 +381,13 @@ pub enum Event {
 #[derive(Serialize, Tsify, Clone)]
 #[serde(rename_all = "camelCase")]
 pub struct PlanSummary {
-    /// The options planned with.
+    /// The options planned with, those that were left to the engine filled in.
     pub options: RunOptions,
+    /// Where depth will come from.
+    pub depth: DepthSource,
     /// Usable frames of the scan.
     pub frames: u32,
-    /// Frames kept by the keyframe rule.
+    /// Frames that will be used: what the keyframe rule, `every` and `views` leave.
     pub keyframes: u32,
     /// Bricks expected.
     pub bricks: u32,
@@ -375,7 +407,9 @@ pub enum StageName {
     Opening,
     /// Kernels are compiled.
     WarmingUp,
-    /// Depth becomes a volume.
+    /// Views are matched with their neighbours, and the depth that comes of it becomes a volume; counted in keyframes.
+    Matching,
+    /// The sensor's depth becomes a volume; counted in keyframes.
     Fusing,
     /// The last bricks of the mesh are made.
     Meshing,

@@ -1,4 +1,5 @@
 /** Numbers as people read them. */
+import type { PixelSize } from "./ipdrecon/index.js";
 
 /** Bytes in the unit that leaves at most three digits. */
 export function bytes(n: number): string {
@@ -15,6 +16,11 @@ export function seconds(s: number): string {
 /** A length given in metres, in centimetres. */
 export function centimetres(m: number): string {
   return `${Number((m * 100).toFixed(1))} cm`;
+}
+
+/** A picture's size. */
+export function pixels({ widthPx, heightPx }: PixelSize): string {
+  return `${widthPx} × ${heightPx}`;
 }
 
 /** A number that came through f32, as it was meant: 0.03999999910593033 is 0.04. */

@@ -1,14 +1,13 @@
 /** Progress: which stage, how much of it, and the buttons that hold and stop it. */
 import type { IpdReconElement } from "./ipdrecon/index.js";
-import { count, counted, STAGE_ORDER, stageTitle } from "./ipdrecon/index.js";
+import { count, counted, stageOrder, stageTitle } from "./ipdrecon/index.js";
 import { byId, make, write } from "./dom.js";
 import { seconds } from "./format.js";
 import type { Model } from "./model.js";
 
-const steps = STAGE_ORDER.map((stage) => {
+const steps = stageOrder().map(() => {
   const step = make("li");
-  step.title = stageTitle(stage);
-  step.append(make("span", stageTitle(stage), "unseen"));
+  step.append(make("span", "", "unseen"));
   return step;
 });
 
@@ -24,12 +23,15 @@ export function wireRunning(viewer: IpdReconElement): void {
 }
 
 /** Draws progress. */
-export function drawRunning({ state, stage: told, progress, triangles }: Model): void {
+export function drawRunning({ state, stage: told, progress, triangles, plan }: Model): void {
   const opening = state === "opening";
   byId("running").hidden = !opening && state !== "running" && state !== "paused";
   const stage = opening ? "opening" : told;
-  const now = stage ? STAGE_ORDER.indexOf(stage) : 0;
+  const order = stageOrder(plan?.depth);
+  const now = stage ? order.indexOf(stage) : 0;
   steps.forEach((step, index) => {
+    const name = order[index];
+    if (name) write(step.firstElementChild as HTMLElement, (step.title = stageTitle(name)));
     step.className = index < now ? "past" : "";
     if (index === now) step.setAttribute("aria-current", "step");
     else step.removeAttribute("aria-current");
