@@ -39,17 +39,27 @@ impl DepthFolder {
     pub fn create(folder: &Path, scan: &Scan) -> Result<Self, Failure> {
         let made = fs::create_dir_all(folder);
         made.map_err(|error| Failure::file("write", folder, error))?;
-        Ok(Self::of(folder, scan))
+        Self::of(folder, scan)
     }
 
     /// A folder that is there.
-    pub fn of(folder: &Path, scan: &Scan) -> Self {
+    pub fn of(folder: &Path, scan: &Scan) -> Result<Self, Failure> {
+        fs::read_dir(folder).map_err(|error| Failure::file("read", folder, error))?;
         let names = scan.frames().iter();
-        Self {
+        Ok(Self {
             folder: folder.to_owned(),
             names: names
                 .map(|frame| frame.name.replace(['/', '\\'], "_"))
                 .collect(),
+        })
+    }
+
+    /// That no file in it belongs to a frame with the sensor's depth.
+    pub fn nothing_to_compare(&self, scan: &Scan) -> Failure {
+        Failure::NoDepthMaps {
+            folder: self.folder.clone(),
+            name: scan.name().to_owned(),
+            measured: scan.frames().iter().filter(|f| f.depth.is_some()).count(),
         }
     }
 

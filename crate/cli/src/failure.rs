@@ -58,6 +58,20 @@ pub enum Failure {
         /// What is wrong with it.
         error: String,
     },
+    /// Depth maps and a scan that have nothing in common.
+    #[error(
+        "expected depth maps in {} that belong to frames of {name} with depth of a sensor ({measured} frames), found none; \
+         give the folder that `ipdrecon stereo --depth` wrote for this scan, and the scan with its depth images",
+        folder.display()
+    )]
+    NoDepthMaps {
+        /// The folder of depth maps.
+        folder: PathBuf,
+        /// Name of the scan.
+        name: String,
+        /// Frames of the scan with depth.
+        measured: usize,
+    },
     /// A mesh file that is no PLY.
     #[error("{}: {error}", path.display())]
     Ply {

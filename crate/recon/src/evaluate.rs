@@ -1,7 +1,11 @@
-//! How good a mesh is against ground truth, under a named protocol. Meshes are in the scan's own world, as exports are.
+//! How good a mesh is against ground truth, under a named protocol, and depth maps against a sensor's. Meshes are in the
+//! scan's own world, as exports are.
+
+mod depth;
 
 use crate::convert::pinhole;
 use burn::tensor::Device;
+pub use depth::{DepthFigures, compare_depth, mean_depth};
 use glam::{Affine3A, DAffine3, DMat4};
 use mesh::{
     Mesh,
@@ -9,7 +13,7 @@ use mesh::{
     metrics::{self, Depth2d, Surface3d},
     protocol::{self, View, Visibility},
 };
-use scan::Scan;
+use scan::{FrameError, Scan};
 use serde::Serialize;
 use volume::{DepthView, VolumeConfig, VolumeError};
 
@@ -60,6 +64,23 @@ pub enum EvaluateError {
         /// Predicted or ground truth.
         which: &'static str,
     },
+    /// A depth map whose length is not its camera's width times height.
+    #[error(
+        "expected a depth map of {expected} values ({width} x {height}), found {found}; check the camera that was given with it"
+    )]
+    MapSize {
+        /// Width of the camera's picture.
+        width: u32,
+        /// Height of the camera's picture.
+        height: u32,
+        /// Width times height.
+        expected: usize,
+        /// Values given.
+        found: usize,
+    },
+    /// The sensor's depth of a frame cannot be decoded.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
     /// The re-fusion failed.
     #[error(transparent)]
     Volume(#[from] VolumeError),

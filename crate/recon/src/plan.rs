@@ -72,7 +72,7 @@ pub enum PlanError {
     /// Neither depth nor enough colour.
     #[error(
         "expected colour images in at least 2 keyframes of {name} to make depth from, found {found}; \
-         give a scan with depth images, or with more colour images from different places"
+         give a scan with depth images or with more colour images from different places, or take more of its keyframes"
     )]
     TooFewPictures {
         /// Name of the scan.

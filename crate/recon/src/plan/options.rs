@@ -77,6 +77,12 @@ impl Options {
             DepthSource::Sensor => Ok(depth),
             DepthSource::Stereo(config) => {
                 config.check()?;
+                if self.views == Some(1) {
+                    return Err(PlanError::Setting {
+                        what: "to take at least 2 keyframes, for stereo compares them",
+                        found: "1 view".into(),
+                    });
+                }
                 Ok(depth)
             }
         }
