@@ -207,3 +207,137 @@ on_each_device! {
         assert!(VolumeConfig::new(f32::NAN).init(&device).is_err());
     }
 }
+
+/// Fuses the first pose's picture with a confidence for each of its pixels.
+fn fuse_one(volume: &mut Volume, wall_m: f32, confidence: Option<&[f32]>) {
+    let pose = poses()[0];
+    let (depth_m, rgb) = look(&pose, wall_m);
+    let view = DepthView {
+        depth_m: &depth_m,
+        depth_camera: CAMERA,
+        confidence,
+        color: Some((&rgb, CAMERA)),
+        world_from_camera: pose,
+    };
+    volume.integrate(&view).unwrap();
+}
+
+const PIXELS: usize = (CAMERA.width * CAMERA.height) as usize;
+
+/// Largest distance between vertices of the same number.
+fn largest_shift_m(a: &Mesh, b: &Mesh) -> f32 {
+    assert_eq!(a.triangles, b.triangles);
+    let pairs = a.positions.iter().zip(&b.positions);
+    pairs.map(|(a, b)| a.distance(*b)).fold(0.0, f32::max)
+}
+
+on_each_device! {
+    /// Half as sure twice is as good as sure once: the same surface, and enough weight for one only after the second time.
+    async fn half_a_confidence_twice_is_one_confidence(device: Device) {
+        let sure = [1.0; PIXELS];
+        let half = [0.5; PIXELS];
+        // Everything seen once from 2 m is enough, half of it is not.
+        let mut config = config();
+        config.surface.least_weight = 0.7 / (2.2 * 2.2);
+        let mut once = config.init(&device).unwrap();
+        fuse_one(&mut once, 1.9, None);
+        let once = once.mesh().await.unwrap();
+        assert!(once.triangles.len() > 500);
+
+        let mut said = config.init(&device).unwrap();
+        fuse_one(&mut said, 1.9, Some(&sure));
+        assert_eq!(said.mesh().await.unwrap(), once, "1 everywhere is the same as none");
+
+        let mut twice = config.init(&device).unwrap();
+        fuse_one(&mut twice, 1.9, Some(&half));
+        let wall = |mesh: &Mesh| mesh.positions.iter().filter(|p| p.y > 1.8).count();
+        assert_eq!(wall(&twice.mesh().await.unwrap()), 0, "half a confidence is not enough");
+        fuse_one(&mut twice, 1.9, Some(&half));
+        let twice = twice.mesh().await.unwrap();
+        assert!(largest_shift_m(&once, &twice) < 1e-5);
+        assert_eq!(once.colors, twice.colors);
+    }
+}
+
+on_each_device! {
+    /// A wall seen at two distances comes out between them, nearer to the one that is surer.
+    async fn the_surer_measurement_counts_for_more(device: Device) {
+        let mut config = config();
+        config.weigh_by_depth = false;
+        let mut volume = config.init(&device).unwrap();
+        fuse_one(&mut volume, 2.0, Some(&[0.9; PIXELS]));
+        fuse_one(&mut volume, 2.05, Some(&[0.3; PIXELS]));
+        let mesh = volume.mesh().await.unwrap();
+        let wall = mesh.positions.iter().filter(|p| p.x < -0.7);
+        let (sum, count) = wall.fold((0.0, 0), |(sum, count), p| (sum + p.y, count + 1));
+        let found_m = sum / count as f32;
+        // (0.9 * 2 + 0.3 * 2.05) / 1.2
+        assert!((found_m - 2.0125).abs() < 1e-3, "the wall stands at {found_m} m");
+    }
+}
+
+on_each_device! {
+    /// What is worth nothing leaves no trace, not even room that was made for it, and does not spoil what is there.
+    async fn a_confidence_of_nothing_changes_nothing(device: Device) {
+        let mut volume = config().init(&device).unwrap();
+        for worthless in [0.0, -1.0, f32::NAN] {
+            fuse_one(&mut volume, 1.9, Some(&[worthless; PIXELS]));
+            assert_eq!(volume.brick_count(), 0);
+        }
+        fuse_one(&mut volume, 1.9, None);
+        let before = volume.mesh().await.unwrap();
+        // The left half of the picture is sure to be somewhere else, the right half is not.
+        let (left, right): (Vec<f32>, Vec<f32>) = (0..PIXELS)
+            .map(|p| if p % (CAMERA.width as usize) < 80 { (1.0, 0.0) } else { (0.0, f32::NAN) })
+            .unzip();
+        fuse_one(&mut volume, 1.95, Some(&right));
+        assert_eq!(volume.mesh().await.unwrap(), before);
+        fuse_one(&mut volume, 1.95, Some(&left));
+        let after = volume.mesh().await.unwrap();
+        let side = |mesh: &Mesh, right: bool| -> Vec<Vec3> {
+            let far = mesh.positions.iter().filter(|p| (p.x > 0.3) == right && p.x.abs() > 0.3);
+            far.copied().collect()
+        };
+        assert_eq!(side(&after, true), side(&before, true));
+        assert_ne!(side(&after, false), side(&before, false));
+    }
+}
+
+on_each_device! {
+    /// Both forms agree with confidences that differ from pixel to pixel, and are more than 1 here and there.
+    async fn both_forms_agree_on_confidence(device: Device) {
+        let confidence: Vec<f32> = (0..PIXELS).map(|p| (p * 7919 % 97) as f32 / 80.0).collect();
+        let fused = |plain: bool, device: Device| {
+            let mut volume = config().init(&device).unwrap();
+            if plain {
+                volume.use_plain_form();
+            }
+            for wall_m in [1.7, 1.72, 1.69] {
+                fuse_one(&mut volume, wall_m, Some(&confidence));
+            }
+            volume
+        };
+        let reference = fused(true, Device::flex()).mesh().await.unwrap();
+        for plain in [false, true] {
+            assert_same(&reference, &fused(plain, device.clone()).mesh().await.unwrap());
+        }
+    }
+}
+
+on_each_device! {
+    async fn confidence_of_another_size_is_an_error(device: Device) {
+        let mut volume = config().init(&device).unwrap();
+        let pose = poses()[0];
+        let (depth_m, _) = look(&pose, 2.0);
+        let view = DepthView {
+            depth_m: &depth_m,
+            depth_camera: CAMERA,
+            confidence: Some(&[1.0; 3]),
+            color: None,
+            world_from_camera: pose,
+        };
+        let error = volume.integrate(&view).unwrap_err().to_string();
+        assert!(error.contains("confidence image of 19200 values") && error.contains("found 3"), "{error}");
+        assert_eq!(volume.brick_count(), 0);
+    }
+}
