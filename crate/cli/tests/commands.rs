@@ -28,9 +28,14 @@ struct Sample {
 
 impl Sample {
     fn write() -> Self {
+        Self::of(10, |_| true)
+    }
+
+    /// Of this many frames the files whose path is wanted.
+    fn of(frames: usize, wanted: impl Fn(&str) -> bool) -> Self {
         let folder = TempDir::new().unwrap();
-        let sample = SampleScan::new(3, 10, 160, 120);
-        for entry in sample.entries() {
+        let sample = SampleScan::new(3, frames, 160, 120);
+        for entry in sample.entries().iter().filter(|e| wanted(&e.path)) {
             let path = folder.path().join("scan").join(&entry.path);
             fs::create_dir_all(path.parent().unwrap()).unwrap();
             fs::write(path, sample.read(&entry.path).unwrap()).unwrap();
@@ -120,6 +125,55 @@ fn the_mesh_lies_in_the_scans_world_unless_canonical_is_asked_for() {
     assert!(own.positions[0].distance(canonical.positions[0]) > 0.1);
 }
 
+/// Colour and poses alone, some of the keyframes, small pictures: a mesh in the scan's own world, and depth maps that can
+/// be judged against a sensor's.
+#[test]
+fn stereo_makes_a_mesh_and_depth_maps_of_colour_alone() {
+    let color = Sample::of(16, |path| !path.contains("depth"));
+    let (out, maps) = (color.file("room.ply"), color.file("maps"));
+    let scan = color.scan();
+    let mut arguments = vec!["stereo", str(&scan), "-o", str(&out), "--size", "96x72"];
+    arguments.extend(["--views", "12", "--depth", str(&maps)]);
+    let run = ipdrecon(&arguments);
+    let said = text(&run.stderr);
+    assert!(run.status.success(), "{said}");
+    assert!(run.stdout.is_empty());
+    assert!(said.contains("12 of 16 frames as keyframes"), "{said}");
+    let mesh = mesh::ply::read(&fs::read(&out).unwrap()).unwrap();
+    assert!(mesh.triangles.len() > 300, "{said}");
+
+    let names: Vec<String> = fs::read_dir(&maps)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    let count = |ending: &str| names.iter().filter(|name| name.ends_with(ending)).count();
+    assert!(count(".depth.png") >= 10, "{names:?}");
+    assert_eq!(count(".raw.png"), count(".depth.png"));
+    assert!(
+        names.contains(&"frame-000000.depth.png".to_owned()),
+        "{names:?}"
+    );
+
+    // The same walk with its depth is what they are judged by.
+    let whole = Sample::of(16, |_| true);
+    let whole = whole.scan();
+    let eval = vec!["eval", "--depth", str(&maps), "--scan", str(&whole)];
+    let words = text(&ipdrecon(&eval).stdout);
+    assert!(
+        words.contains("raw depth of")
+            && words.contains("filtered depth of")
+            && words.contains("coverage"),
+        "{words}"
+    );
+    let run = ipdrecon(&[eval, vec!["--json"]].concat());
+    let report: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+    let figure = |kind: &str, name: &str| report[kind][name].as_f64().unwrap();
+    assert_eq!(figure("raw", "maps"), count(".raw.png") as f64);
+    assert!(figure("raw", "coverage") > 0.9);
+    assert!(figure("filtered", "coverage") < figure("raw", "coverage"));
+    assert!(figure("filtered", "abs_rel") < figure("raw", "abs_rel"));
+}
+
 #[test]
 fn doctor_reports_in_words_and_in_json() {
     let sample = Sample::write();
@@ -163,7 +217,29 @@ fn what_cannot_be_done_is_said_in_one_line() {
     fs::write(&no_zip, "not a zip").unwrap();
     let no_ply = sample.file("no.ply");
     fs::write(&no_ply, "solid cube").unwrap();
-    let cases: [(&[&str], &[&str]); 7] = [
+    let color = Sample::of(3, |path| !path.contains("depth"));
+    let color = color.scan();
+    let cases: [(&[&str], &[&str]); 12] = [
+        (
+            &["fuse", str(&color), "-o", str(&out)],
+            &["found none", "ipdrecon stereo"],
+        ),
+        (
+            &["stereo", str(&color), "-o", str(&out), "--views", "1"],
+            &["at least 2 keyframes", "1 view"],
+        ),
+        (
+            &["stereo", str(&color), "-o", str(&out), "--size", "8x6"],
+            &["working size", "8x6"],
+        ),
+        (
+            &["eval", "--depth", str(&empty), "--scan", str(&scan)],
+            &["expected depth maps", "found none", "stereo --depth"],
+        ),
+        (
+            &["eval", "--depth", "missing", "--scan", str(&scan)],
+            &["missing", "read"],
+        ),
         (
             &["fuse", str(&scan), "-o", "room.stl"],
             &[".ply, .glb or .obj", "room.stl"],
@@ -213,8 +289,10 @@ fn what_cannot_be_done_is_said_in_one_line() {
         let run = ipdrecon(arguments);
         let said = text(&run.stderr);
         assert!(!run.status.success(), "{arguments:?} succeeded");
+        // What was noticed when the scan was opened may stand before it.
+        let last = said.lines().last().unwrap();
         assert!(
-            said.starts_with("error: ") && !said.contains("panicked"),
+            last.starts_with("error: ") && !said.contains("panicked"),
             "{arguments:?}: {said}"
         );
         for word in words {

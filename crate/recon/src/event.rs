@@ -6,7 +6,7 @@ use stereo::DepthMap;
 use volume::{BrickMeshes, VolumeError};
 
 /// The stages of a run, in order; a run has either [`Stage::Matching`] or [`Stage::Fusing`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stage {
     /// Kernels are compiled.
     WarmingUp,
@@ -38,7 +38,7 @@ pub trait Sink {
     /// Something about a frame that the user should know; the run goes on without it.
     fn finding(&mut self, _finding: Finding) {}
 
-    /// A keyframe's depth was made from colour; it is fused next.
+    /// A keyframe's depth was made from colour; it is fused next, if any of it may be relied on.
     fn depth_map(&mut self, _map: &DepthMap) {}
 
     /// Where bricks are wanted first, in the canonical world; `None` for no streaming: the mesh is then taken at the end.

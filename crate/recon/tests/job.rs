@@ -6,11 +6,11 @@
 mod common;
 
 use burn::tensor::Device;
-use common::{Recorder, SEED, open, sample};
+use common::{Recorder, SEED, files, open, sample};
 use glam::Vec3;
 use mesh::Mesh;
 use recon::{DepthSource, Limits, Options, Stage};
-use scan::{MemorySource, Scan, Source};
+use scan::Scan;
 use synth::Room;
 
 fn run(scan: &Scan, options: Options, sink: &mut Recorder) -> recon::Outcome {
@@ -22,20 +22,6 @@ fn mesh_in_scan_world(scan: &Scan, outcome: &recon::Outcome) -> Mesh {
     let mut mesh = pollster::block_on(outcome.volume.mesh()).unwrap();
     mesh.transform(&scan.scan_from_canonical());
     mesh
-}
-
-/// The sample's files, changed.
-fn files(change: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>) -> MemorySource {
-    let sample = sample();
-    let paths: Vec<String> = sample
-        .entries()
-        .iter()
-        .map(|entry| entry.path.clone())
-        .collect();
-    MemorySource::new(paths.into_iter().filter_map(|path| {
-        let bytes = change(&path, sample.read(&path).unwrap())?;
-        Some((path, bytes))
-    }))
 }
 
 #[test]

@@ -34,9 +34,12 @@ impl DepthView<'_> {
 
     /// Depth of a pixel in metres, 0 where nothing was measured or where the measurement is worth nothing.
     pub(crate) fn depth_at(&self, pixel: usize) -> f32 {
-        match self.confidence {
-            Some(confidence) if !(confidence[pixel] > 0.0) => 0.0,
-            _ => self.depth_m[pixel],
+        // Not so for NaN.
+        let counts = |confidence: &[f32]| confidence[pixel] > 0.0;
+        if self.confidence.is_none_or(counts) {
+            self.depth_m[pixel]
+        } else {
+            0.0
         }
     }
 }

@@ -11,10 +11,10 @@ const SAMPLED_KEYFRAMES: usize = 16;
 /// The walls of a room are expected up to here from its cameras, in metres.
 const REACH_M: f64 = 3.0;
 /// Bricks that a scan of colour needs, at most, for each face of a brick on the box that its cameras look into. Measured
-/// with voxels of 2, 4 and 8 cm, all of which give about the same: 1.24 to 1.32 in a whole room (hololens, 100
-/// keyframes), 1.06 to 1.26 in rooms made by rule, 0.47 to 0.60 where a corner of a room is seen (livingroom), less with
-/// fewer keyframes. This is a quarter above the most.
-const BRICKS_A_FACE: f64 = 1.65;
+/// by stereo at 320x240 with voxels of 2, 4 and 8 cm: 1.71, 1.58, 1.48 in a whole room (hololens, 100 keyframes), 1.39 to
+/// 1.61 in two rooms made by rule, 0.60 to 0.78 where a corner of a room is seen (livingroom). At 160x120 it is a quarter
+/// less, with a third of the keyframes half. This is a quarter above the most.
+const BRICKS_A_FACE: f64 = 2.1;
 
 /// What is known of the surface before a run.
 pub(super) enum Foresight {

@@ -25,9 +25,9 @@ pub(super) async fn fuse(
     sink.stage(Stage::Matching, keyframes.len());
     let mut stereo = config.init(scan, keyframes)?;
     let mut matched = 0;
-    // Frames with depth, and files that a finding has told of already.
+    // Frames with depth, and what was told: a picture that cannot be used may come up with more than one keyframe.
     let mut given: HashSet<usize> = HashSet::new();
-    let mut told: HashSet<String> = HashSet::new();
+    let mut told: Vec<Finding> = Vec::new();
     loop {
         if sink.checkpoint().await == Flow::Stop {
             fusion.stopped = true;
@@ -40,10 +40,10 @@ pub(super) async fn fuse(
                 sink.progress(matched);
             }
             Step::Depth(map) => {
+                sink.depth_map(&map);
                 if !map.depth_m.iter().any(|&z| z > 0.0) {
                     continue;
                 }
-                sink.depth_map(&map);
                 given.insert(map.frame);
                 match take(scan, &map, fusion, sink).await {
                     Err(RunError::Volume(full @ VolumeError::TooManyBricks { .. })) => {
@@ -55,16 +55,19 @@ pub(super) async fn fuse(
                 }
             }
             Step::Finding(finding) => {
-                told.extend(finding.file.clone());
-                sink.finding(finding);
+                if !told.contains(&finding) {
+                    sink.finding(finding.clone());
+                    told.push(finding);
+                }
             }
             Step::Done => break,
         }
     }
     sink.progress(keyframes.len());
     let silent = |frame: &&Frame| {
-        let file = frame.color.as_ref().map(|color| &color.path);
-        !file.is_some_and(|file| told.contains(file))
+        let picture = frame.color.as_ref().map(|color| color.path.as_str());
+        let about = |file: &str| Some(file) == picture || file == frame.name;
+        !told.iter().any(|f| f.file.as_deref().is_some_and(about))
     };
     let without = keyframes.iter().filter(|frame| !given.contains(frame));
     let without: Vec<&Frame> = without.map(|&f| &scan.frames()[f]).filter(silent).collect();

@@ -5,8 +5,9 @@
 use burn::tensor::Device;
 use glam::Vec3;
 use recon::{Flow, Sink, Stage};
-use scan::{FolderSource, Scan};
-use std::{path::PathBuf, rc::Rc};
+use scan::{FolderSource, MemorySource, Scan, Source};
+use std::{collections::HashMap, path::PathBuf, rc::Rc};
+use stereo::DepthMap;
 use synth::SampleScan;
 use volume::{BrickMeshes, VolumeError};
 
@@ -20,6 +21,25 @@ pub fn sample() -> SampleScan {
 
 pub fn open(source: impl scan::Source + 'static) -> Scan {
     scan::open(Rc::new(source)).unwrap()
+}
+
+/// The sample's files, changed; `None` leaves one out.
+pub fn files(change: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>) -> MemorySource {
+    let sample = sample();
+    let paths: Vec<String> = sample
+        .entries()
+        .iter()
+        .map(|entry| entry.path.clone())
+        .collect();
+    MemorySource::new(paths.into_iter().filter_map(|path| {
+        let bytes = change(&path, sample.read(&path).unwrap())?;
+        Some((path, bytes))
+    }))
+}
+
+/// The sample without its depth, and with changed files.
+pub fn color_alone(change: impl Fn(&str, Vec<u8>) -> Vec<u8>) -> MemorySource {
+    files(|path, bytes| (!path.contains("depth")).then(|| change(path, bytes)))
 }
 
 /// A folder of the real scans beside this repository; `None`, and a line that says so, where it is absent.
@@ -55,7 +75,12 @@ pub struct Recorder {
     pub stages: Vec<(Stage, usize)>,
     pub progress: Vec<usize>,
     pub findings: Vec<scan::Finding>,
+    /// Progress of each stage.
+    pub progress_of: HashMap<Stage, Vec<usize>>,
     pub surfaces: Vec<usize>,
+    /// Progress of its stage when the first surface came.
+    pub first_surface_at: Option<usize>,
+    pub maps: Vec<DepthMap>,
     pub stop_after: Option<usize>,
     pub checkpoints: usize,
     pub watching: bool,
@@ -68,10 +93,17 @@ impl Sink for Recorder {
 
     fn progress(&mut self, done: usize) {
         self.progress.push(done);
+        if let Some((stage, _)) = self.stages.last() {
+            self.progress_of.entry(*stage).or_default().push(done);
+        }
     }
 
     fn finding(&mut self, finding: scan::Finding) {
         self.findings.push(finding);
+    }
+
+    fn depth_map(&mut self, map: &DepthMap) {
+        self.maps.push(map.clone());
     }
 
     fn eye(&self) -> Option<Vec3> {
@@ -79,6 +111,8 @@ impl Sink for Recorder {
     }
 
     async fn bricks(&mut self, meshes: BrickMeshes) -> Result<(), VolumeError> {
+        self.first_surface_at
+            .get_or_insert(self.progress.last().copied().unwrap_or(0));
         self.surfaces.push(meshes.vertices.dims()[0] / 3);
         Ok(())
     }
