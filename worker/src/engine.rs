@@ -50,6 +50,8 @@ pub struct Engine {
     state: Cell<RunState>,
     frame_asked: Cell<bool>,
     last_frame_ms: Cell<f64>,
+    /// Since when there is motion that no frame has shown; `None` at rest.
+    moving_since_ms: Cell<Option<f64>>,
     /// The visitor moved the view since it last came to rest.
     touched: Cell<bool>,
 }
@@ -147,6 +149,7 @@ impl Engine {
             state: Cell::new(RunState::Idle),
             frame_asked: Cell::new(false),
             last_frame_ms: Cell::new(0.0),
+            moving_since_ms: Cell::new(None),
             touched: Cell::new(false),
         }
     }
@@ -319,7 +322,15 @@ impl Engine {
         });
     }
 
+    /// Whether the visitor moves the view, or it has not come to rest since.
+    pub fn is_touched(&self) -> bool {
+        self.touched.get()
+    }
+
     fn ask_frame(self: &Rc<Self>) {
+        if self.moving_since_ms.get().is_none() {
+            self.moving_since_ms.set(Some(platform::now_ms()));
+        }
         if !self.frame_asked.replace(true) {
             let engine = self.clone();
             platform::on_next_frame(move || engine.frame());
@@ -339,9 +350,13 @@ impl Engine {
             return;
         };
         self.last_frame_ms.set(now_ms);
-        // After a rest the clock says nothing about the motion.
-        let dt_s = (since_ms / 1000.0).min(0.1) as f32;
-        if stage.frame(dt_s) {
+        // The run may have kept this thread for seconds: the motion has gone on meanwhile, so that few frames are enough.
+        let since_ms = self
+            .moving_since_ms
+            .take()
+            .map_or(0.0, |at_ms| now_ms - at_ms);
+        if stage.frame((since_ms / 1000.0) as f32) {
+            self.moving_since_ms.set(Some(now_ms));
             self.ask_frame();
         } else if self.touched.replace(false) {
             self.emit(&Event::CameraChanged {

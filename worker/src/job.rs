@@ -21,6 +21,10 @@ use web_sys::{Blob, ImageEncodeOptions};
 
 /// How long a paused run waits before it looks again.
 const PAUSE_TURN_MS: i32 = 40;
+/// While the visitor moves the view, it gets frames for this share of a long step's time, and at most for so long.
+const HAND_SHARE: f64 = 0.1;
+const HAND_MS: f64 = 300.0;
+const FRAME_MS: i32 = 16;
 
 /// Where a scan comes from.
 pub enum Origin {
@@ -169,6 +173,7 @@ pub async fn run(engine: Rc<Engine>, options: RunOptions) {
         engine: engine.clone(),
         started_ms: platform::now_ms(),
         total: 0,
+        step_ms: platform::now_ms(),
     };
     let result = recon::run(&scan, &plan, &engine.device, &mut sink).await;
     engine.set_state(RunState::Idle);
@@ -204,6 +209,8 @@ struct PageSink {
     engine: Rc<Engine>,
     started_ms: f64,
     total: usize,
+    /// When the step that is being done began.
+    step_ms: f64,
 }
 
 impl PageSink {
@@ -249,7 +256,12 @@ impl Sink for PageSink {
     }
 
     async fn checkpoint(&mut self) -> Flow {
+        let now_ms = platform::now_ms();
+        let hand_ms = ((now_ms - self.step_ms) * HAND_SHARE).min(HAND_MS);
         platform::sleep_ms(0).await;
+        while self.engine.is_touched() && platform::now_ms() - now_ms < hand_ms {
+            platform::sleep_ms(FRAME_MS).await;
+        }
         if self.engine.state() == RunState::Pausing {
             let held_ms = platform::now_ms();
             self.engine.set_state(RunState::Paused);
@@ -262,6 +274,7 @@ impl Sink for PageSink {
                 self.engine.emit(&Event::Resumed);
             }
         }
+        self.step_ms = platform::now_ms();
         match self.engine.state() {
             RunState::Stopping => Flow::Stop,
             _ => Flow::Continue,

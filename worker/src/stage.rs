@@ -13,6 +13,9 @@ use web_sys::{ImageData, OffscreenCanvas, OffscreenCanvasRenderingContext2d};
 
 /// Bytes of the arena's buffers: a few thousand bricks each, far below every device's limit.
 const PAGE_BYTES: u64 = 8 << 20;
+/// The controls take no more than this in one step; and motion has long come to rest after this.
+const CONTROLS_STEP_S: f32 = 0.1;
+const MOTION_S: f32 = 2.0;
 /// Bricks are as large as those of 4 cm voxels until a run says otherwise.
 const FIRST_BRICK_SIZE_M: f32 = 0.32;
 
@@ -192,7 +195,10 @@ impl Stage {
 
     /// Moves the camera on by `dt_s` and paints. Whether there is more to come: motion, or an answer to a pick.
     pub fn frame(&mut self, dt_s: f32) -> bool {
-        let moving = self.controls.tick(dt_s);
+        let mut moving = self.controls.tick(dt_s);
+        for _ in 1..(dt_s.min(MOTION_S) / CONTROLS_STEP_S) as usize {
+            moving = moving && self.controls.tick(CONTROLS_STEP_S);
+        }
         self.paint();
         let waiting = self.settle_pick();
         moving || waiting
