@@ -47,7 +47,10 @@ impl StereoConfig {
         }
         if !(self.near_m >= 0.05 && self.near_m < self.far_m && self.far_m <= 100.0) {
             let found = format!("{} m to {} m", self.near_m, self.far_m);
-            return fault("depths from at least 0.05 m to at most 100 m, the nearer first", found);
+            return fault(
+                "depths from at least 0.05 m to at most 100 m, the nearer first",
+                found,
+            );
         }
         if !(1..=32).contains(&self.sources) {
             return fault("between 1 and 32 source views", self.sources.to_string());

@@ -1,137 +1,329 @@
+//! The plane sweep (Collins 1996): how well each pixel of a keyframe matches its source views at each inverse depth.
+//!
+//! The hypothesis of pixel `p` on plane `d` is the inverse depth `rho = base(p) + offset[d]`. A source view is sampled
+//! there bilinearly and compared by zero-mean normalised cross-correlation over a square window, with the noise of a camera
+//! added to both variances: exposure and white balance cancel out, and blank walls match nothing rather than everything.
+//! Of the sources that see the point the best share counts, since some are occluded (Kang, Szeliski and Chai 2001).
+
 use crate::view::{View, Warp, warp};
+use pulp::Arch;
 use rayon::prelude::*;
 
-pub const NONE: f32 = -2.0;
+/// Rows of a picture that are worked on at a time.
+const BAND: usize = 16;
+/// Planes whose costs are gathered before they are written out, so that memory is written a run at a time.
+const BLOCK: usize = 8;
+/// Below every correlation: the source does not see the point.
+const UNSEEN: f32 = -2.0;
+/// An inverse depth cannot be less, in 1/m.
+const LEAST_RHO: f32 = 1e-3;
 
-#[derive(Clone, Debug)]
-pub struct SweepConfig { pub radius: usize, pub noise_var: f32, pub best: f32 }
+/// How views are compared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SweepConfig {
+    /// The window is `2 radius + 1` pixels wide; 1 to 4.
+    pub radius: usize,
+    /// Variance of a camera's noise, in squared grey levels of 256.
+    pub noise_var: f32,
+    /// Share of the seeing sources that counts, the best first; rounded up.
+    pub best: f32,
+}
 
-/// cost[(y*W+x)*D+d] in 0..2 ; 1 where unknown. rho = base + offsets[d]
-pub fn sweep(reference: &View, sources: &[&View], base: Option<&[f32]>, offsets: &[f32], c: &SweepConfig) -> Vec<f32> {
-    let (w, h) = (reference.camera.width as usize, reference.camera.height as usize);
-    let d = offsets.len();
-    let band = 16usize;
-    let mut cost = vec![1.0f32; w * h * d];
+/// The cost of every plane at every pixel: `[height * width * offsets]`, planes innermost; `1 - mean correlation`, 0 to 2,
+/// and 1 where no source sees the point. `base` has `[height * width]` inverse depths in 1/m.
+pub fn sweep(
+    reference: &View,
+    sources: &[&View],
+    base: Option<&[f32]>,
+    offsets: &[f32],
+    config: &SweepConfig,
+) -> Vec<f32> {
+    let (width, height) = reference.size();
+    let planes = offsets.len();
     let warps: Vec<Warp> = sources.iter().map(|s| warp(reference, s)).collect();
-    cost.par_chunks_mut(band * w * d).enumerate().for_each(|(i, out)| {
-        let y0 = i * band;
-        let y1 = (y0 + band).min(h);
-        band_cost(reference, sources, &warps, base, offsets, c, y0, y1, out);
+    let mut cost = vec![1.0f32; width * height * planes];
+    let job = Job {
+        reference,
+        sources,
+        warps: &warps,
+        base,
+        offsets,
+        config,
+    };
+    let bands = cost.par_chunks_mut(BAND * width * planes).enumerate();
+    bands.for_each(|(band, out)| {
+        let first = band * BAND;
+        let last = (first + BAND).min(height);
+        Arch::new().dispatch(
+            #[inline(always)]
+            || match config.radius {
+                1 => job.band::<1>(first, last, out),
+                2 => job.band::<2>(first, last, out),
+                3 => job.band::<3>(first, last, out),
+                _ => job.band::<4>(first, last, out),
+            },
+        );
     });
     cost
 }
 
-#[allow(clippy::too_many_arguments)]
-fn band_cost(reference: &View, sources: &[&View], warps: &[Warp], base: Option<&[f32]>, offsets: &[f32], c: &SweepConfig, y0: usize, y1: usize, out: &mut [f32]) {
-    let (w, h) = (reference.camera.width as usize, reference.camera.height as usize);
-    let r = c.radius;
-    let d = offsets.len();
-    let (h0, h1) = (y0.saturating_sub(r), (y1 + r).min(h));
-    let rows = h1 - h0;
-    let gray = &reference.gray[h0 * w..h1 * w];
-    let n_px = (y1 - y0) * w;
-    // reference sums
-    let mut tmp = vec![0.0f32; w];
-    let mut sr = vec![0.0f32; n_px];
-    let mut srr = vec![0.0f32; n_px];
-    let mut count = vec![0.0f32; n_px];
-    let sq: Vec<f32> = gray.iter().map(|v| v * v).collect();
-    let ones = vec![1.0f32; rows * w];
-    for y in y0..y1 {
-        let (a, b) = (y.saturating_sub(r) - h0, (y + r + 1).min(h) - h0);
-        let o = (y - y0) * w;
-        boxrow(gray, w, a, b, r, &mut tmp, &mut sr[o..o + w]);
-        boxrow(&sq, w, a, b, r, &mut tmp, &mut srr[o..o + w]);
-        boxrow(&ones, w, a, b, r, &mut tmp, &mut count[o..o + w]);
+struct Job<'a> {
+    reference: &'a View,
+    sources: &'a [&'a View],
+    warps: &'a [Warp],
+    base: Option<&'a [f32]>,
+    offsets: &'a [f32],
+    config: &'a SweepConfig,
+}
+
+/// A row with room for a window beyond both ends, filled with zeros there.
+struct Padded<const R: usize>(Vec<f32>);
+
+impl<const R: usize> Padded<R> {
+    fn new(width: usize) -> Self {
+        Self(vec![0.0; width + 2 * R])
     }
-    let mut ws = vec![0.0f32; rows * w];
-    let mut wss = vec![0.0f32; rows * w];
-    let mut wrs = vec![0.0f32; rows * w];
-    let mut valid = vec![false; rows * w];
-    let mut scores = vec![NONE; sources.len() * n_px];
-    let (mut s1, mut s2, mut s3) = (vec![0.0f32; w], vec![0.0f32; w], vec![0.0f32; w]);
-    for (di, &off) in offsets.iter().enumerate() {
-        for (si, (src, wp)) in sources.iter().zip(warps).enumerate() {
-            let (sw, sh) = (src.camera.width as usize, src.camera.height as usize);
-            let (mx, my) = (sw as f32 - 1.001, sh as f32 - 1.001);
-            for y in h0..h1 {
-                let o = (y - h0) * w;
-                let yf = y as f32;
-                let (u0, v0, z0) = (wp.a[1] * yf + wp.a[2], wp.a[4] * yf + wp.a[5], wp.a[7] * yf + wp.a[8]);
-                for x in 0..w {
-                    let rho = base.map_or(off, |b| (b[y * w + x] + off).max(1e-3));
-                    let xf = x as f32;
-                    let z = wp.a[6] * xf + z0 + wp.b[2] * rho;
-                    let inv = 1.0 / z;
-                    let u = (wp.a[0] * xf + u0 + wp.b[0] * rho) * inv;
-                    let v = (wp.a[3] * xf + v0 + wp.b[1] * rho) * inv;
-                    let ok = z > 1e-6 && u >= 0.0 && v >= 0.0 && u <= mx && v <= my;
-                    let (u, v) = (u.max(0.0).min(mx), v.max(0.0).min(my));
-                    let (ui, vi) = (u as usize, v as usize);
-                    let (fu, fv) = (u - ui as f32, v - vi as f32);
-                    let at = vi * sw + ui;
-                    let g = &src.gray;
-                    let top = g[at] + (g[at + 1] - g[at]) * fu;
-                    let bot = g[at + sw] + (g[at + sw + 1] - g[at + sw]) * fu;
-                    let s = top + (bot - top) * fv;
-                    ws[o + x] = s;
-                    wss[o + x] = s * s;
-                    wrs[o + x] = s * gray[o + x];
-                    valid[o + x] = ok;
-                }
-            }
-            for y in y0..y1 {
-                let (a, b) = (y.saturating_sub(r) - h0, (y + r + 1).min(h) - h0);
-                boxrow(&ws, w, a, b, r, &mut tmp, &mut s1);
-                boxrow(&wss, w, a, b, r, &mut tmp, &mut s2);
-                boxrow(&wrs, w, a, b, r, &mut tmp, &mut s3);
-                let o = (y - y0) * w;
-                let sc = &mut scores[si * n_px + o..si * n_px + o + w];
-                let va = &valid[(y - h0) * w..(y - h0) * w + w];
-                for x in 0..w {
-                    let n = count[o + x];
-                    let inv = 1.0 / n;
-                    let cov = s3[x] - s1[x] * sr[o + x] * inv;
-                    let vr = (srr[o + x] - sr[o + x] * sr[o + x] * inv).max(0.0) + c.noise_var * n;
-                    let vs = (s2[x] - s1[x] * s1[x] * inv).max(0.0) + c.noise_var * n;
-                    let z = cov / (vr * vs).sqrt();
-                    sc[x] = if va[x] { z } else { NONE };
-                }
+
+    /// Sums some rows of `width` values.
+    #[inline(always)]
+    fn sum_rows(&mut self, rows: &[f32], width: usize) {
+        let to = &mut self.0[R..R + width];
+        let mut rows = rows.chunks_exact(width);
+        if let Some(first) = rows.next() {
+            to.copy_from_slice(first);
+        }
+        for row in rows {
+            for (to, from) in to.iter_mut().zip(row) {
+                *to += from;
             }
         }
-        // best share of the sources that see it
-        let ns = sources.len();
-        let mut vals = [0.0f32; 32];
-        for p in 0..n_px {
-            let mut n = 0;
-            for s in 0..ns {
-                let v = scores[s * n_px + p];
-                if v > NONE {
-                    let mut k = n;
-                    while k > 0 && vals[k - 1] < v { vals[k] = vals[k - 1]; k -= 1; }
-                    vals[k] = v;
-                    n += 1;
+    }
+
+    #[inline(always)]
+    fn window(&self, x: usize) -> f32 {
+        let mut sum = 0.0;
+        for k in 0..2 * R + 1 {
+            sum += self.0[x + k];
+        }
+        sum
+    }
+}
+
+impl Job<'_> {
+    /// Costs of the rows `first..last`.
+    #[inline(always)]
+    fn band<const R: usize>(&self, first: usize, last: usize, out: &mut [f32]) {
+        let (width, height) = self.reference.size();
+        let planes = self.offsets.len();
+        let pixels = (last - first) * width;
+        // Rows that the windows reach.
+        let (above, below) = (first.saturating_sub(R), (last + R).min(height));
+        let gray = &self.reference.gray[above * width..below * width];
+        let span = |y: usize| {
+            (y.saturating_sub(R) - above) * width..((y + R + 1).min(height) - above) * width
+        };
+
+        let mut column = [
+            Padded::<R>::new(width),
+            Padded::new(width),
+            Padded::new(width),
+        ];
+        // Per pixel: 1 / window size, mean of the reference, 1 / sqrt(variance sum with noise).
+        let (mut per_count, mut ref_sum, mut ref_scale) = (
+            vec![0.0f32; pixels],
+            vec![0.0f32; pixels],
+            vec![0.0f32; pixels],
+        );
+        let squares: Vec<f32> = gray.iter().map(|v| v * v).collect();
+        for y in first..last {
+            let at = (y - first) * width;
+            column[0].sum_rows(&gray[span(y)], width);
+            column[1].sum_rows(&squares[span(y)], width);
+            let rows = span(y).len() / width;
+            for x in 0..width {
+                let columns = (x + R + 1).min(width) - x.saturating_sub(R);
+                let count = (rows * columns) as f32;
+                let (sum, sum_of_squares) = (column[0].window(x), column[1].window(x));
+                let variance =
+                    (sum_of_squares - sum * sum / count).max(0.0) + self.config.noise_var * count;
+                per_count[at + x] = 1.0 / count;
+                ref_sum[at + x] = sum;
+                ref_scale[at + x] = 1.0 / variance.sqrt();
+            }
+        }
+
+        let reach = (below - above) * width;
+        let (mut warped, mut warped_squares, mut products) = (
+            vec![0.0f32; reach],
+            vec![0.0f32; reach],
+            vec![0.0f32; reach],
+        );
+        let mut seen = vec![0.0f32; reach];
+        let most = ((self.sources.len() as f32 * self.config.best).ceil() as usize)
+            .clamp(1, self.sources.len().max(1));
+        let mut best = vec![UNSEEN; most * pixels];
+        let mut count = vec![0.0f32; pixels];
+        let mut block = vec![1.0f32; BLOCK * pixels];
+        for (block_index, offsets) in self.offsets.chunks(BLOCK).enumerate() {
+            for (plane, &offset) in offsets.iter().enumerate() {
+                best.fill(UNSEEN);
+                count.fill(0.0);
+                for (source, warp) in self.sources.iter().zip(self.warps) {
+                    for y in above..below {
+                        let row = (y - above) * width..(y - above + 1) * width;
+                        let base = self.base.map(|base| &base[y * width..(y + 1) * width]);
+                        warp_row(
+                            source,
+                            warp,
+                            y,
+                            base,
+                            offset,
+                            &mut warped[row.clone()],
+                            &mut seen[row.clone()],
+                        );
+                        let (gray, warped) = (&gray[row.clone()], &warped[row.clone()]);
+                        let (squares, products) =
+                            (&mut warped_squares[row.clone()], &mut products[row]);
+                        for x in 0..width {
+                            squares[x] = warped[x] * warped[x];
+                            products[x] = warped[x] * gray[x];
+                        }
+                    }
+                    for y in first..last {
+                        column[0].sum_rows(&warped[span(y)], width);
+                        column[1].sum_rows(&warped_squares[span(y)], width);
+                        column[2].sum_rows(&products[span(y)], width);
+                        let at = (y - first) * width;
+                        let here = at..at + width;
+                        let seen = &seen[(y - above) * width..(y - above + 1) * width];
+                        let (per_count, ref_sum, ref_scale) = (
+                            &per_count[here.clone()],
+                            &ref_sum[here.clone()],
+                            &ref_scale[here.clone()],
+                        );
+                        let count = &mut count[here];
+                        let noise = self.config.noise_var;
+                        let mut score = [0.0f32; 64];
+                        for from in (0..width).step_by(64) {
+                            let n = (width - from).min(64);
+                            for (i, score) in score[..n].iter_mut().enumerate() {
+                                let x = from + i;
+                                let (s, ss, rs) = (
+                                    column[0].window(x),
+                                    column[1].window(x),
+                                    column[2].window(x),
+                                );
+                                let covariance = rs - s * ref_sum[x] * per_count[x];
+                                let variance =
+                                    (ss - s * s * per_count[x]).max(0.0) + noise / per_count[x];
+                                let correlation = covariance * ref_scale[x] / variance.sqrt();
+                                *score = if seen[x] > 0.0 { correlation } else { UNSEEN };
+                                count[x] += seen[x];
+                            }
+                            // Keeps the best in order: each pushes the lesser one down.
+                            for rank in 0..most {
+                                let best = &mut best[rank * pixels + at + from..][..n];
+                                for (score, best) in score[..n].iter_mut().zip(best) {
+                                    let (high, low) = if *score > *best {
+                                        (*score, *best)
+                                    } else {
+                                        (*best, *score)
+                                    };
+                                    *best = high;
+                                    *score = low;
+                                }
+                            }
+                        }
+                    }
+                }
+                let block = &mut block[plane * pixels..(plane + 1) * pixels];
+                block.fill(0.0);
+                for rank in 0..most {
+                    let best = &best[rank * pixels..(rank + 1) * pixels];
+                    for ((sum, &best), &count) in block.iter_mut().zip(best).zip(&count) {
+                        *sum += if (rank as f32) < count * self.config.best {
+                            best
+                        } else {
+                            0.0
+                        };
+                    }
+                }
+                for (cost, &count) in block.iter_mut().zip(&count) {
+                    let counted = (count * self.config.best).ceil();
+                    *cost = if count > 0.0 {
+                        1.0 - *cost / counted
+                    } else {
+                        1.0
+                    };
                 }
             }
-            if n > 0 {
-                let k = ((n as f32 * c.best).ceil() as usize).max(1);
-                let mean = vals[..k].iter().sum::<f32>() / k as f32;
-                out[p * d + di] = 1.0 - mean;
+            let run = offsets.len();
+            for (pixel, out) in out.chunks_exact_mut(planes).enumerate() {
+                let out = &mut out[block_index * BLOCK..][..run];
+                for (plane, out) in out.iter_mut().enumerate() {
+                    *out = block[plane * pixels + pixel];
+                }
             }
         }
     }
 }
 
-fn boxrow(src: &[f32], w: usize, a: usize, b: usize, r: usize, tmp: &mut [f32], out: &mut [f32]) {
-    tmp.fill(0.0);
-    for y in a..b {
-        for (t, s) in tmp.iter_mut().zip(&src[y * w..y * w + w]) { *t += s; }
-    }
-    out.fill(0.0);
-    for k in 0..=r {
-        for (o, t) in out[..w - k].iter_mut().zip(&tmp[k..]) { *o += t; }
-    }
-    for k in 1..=r {
-        for (o, t) in out[k..].iter_mut().zip(&tmp[..w - k]) { *o += t; }
+/// Samples one row of a source at the hypotheses of a plane; `seen` is 1 where the sample lies in the source, else 0 and the
+/// nearest pixel of its border stands in.
+#[inline(always)]
+fn warp_row(
+    source: &View,
+    warp: &Warp,
+    y: usize,
+    base: Option<&[f32]>,
+    offset: f32,
+    out: &mut [f32],
+    seen: &mut [f32],
+) {
+    let width = out.len();
+    let (columns, rows) = source.size();
+    // A hair inside, so that the right and lower neighbour exist.
+    let (last_u, last_v) = (columns as f32 - 1.001, rows as f32 - 1.001);
+    let Warp { a, b } = warp;
+    let y = y as f32;
+    let start = [a[1] * y + a[2], a[4] * y + a[5], a[7] * y + a[8]];
+    let gray = &source.gray[..columns * rows];
+    let (mut at, mut fu, mut fv) = ([0u32; 64], [0.0f32; 64], [0.0f32; 64]);
+    for from in (0..width).step_by(64) {
+        let n = (width - from).min(64);
+        for i in 0..n {
+            let x = (from + i) as f32;
+            let rho = match base {
+                Some(base) => (base[from + i] + offset).max(LEAST_RHO),
+                None => offset,
+            };
+            let z = a[6] * x + start[2] + b[2] * rho;
+            let inv = 1.0 / z;
+            let u = (a[0] * x + start[0] + b[0] * rho) * inv;
+            let v = (a[3] * x + start[1] + b[1] * rho) * inv;
+            let inside = (z > 1e-6) & (u >= 0.0) & (v >= 0.0) & (u <= last_u) & (v <= last_v);
+            seen[from + i] = if inside { 1.0 } else { 0.0 };
+            let (u, v) = (u.max(0.0).min(last_u), v.max(0.0).min(last_v));
+            // SAFETY: clamped to the picture just now, NaN included (max gives 0).
+            let (iu, iv): (i32, i32) = unsafe { (u.to_int_unchecked(), v.to_int_unchecked()) };
+            fu[i] = u - iu as f32;
+            fv[i] = v - iv as f32;
+            at[i] = (iv * columns as i32 + iu) as u32;
+        }
+        for (i, out) in out[from..from + n].iter_mut().enumerate() {
+            let at = at[i] as usize;
+            // SAFETY: `at` has a right and a lower neighbour in the picture: see `last_u` and `last_v`.
+            let (p, q, r, s) = unsafe {
+                (
+                    *gray.get_unchecked(at),
+                    *gray.get_unchecked(at + 1),
+                    *gray.get_unchecked(at + columns),
+                    *gray.get_unchecked(at + columns + 1),
+                )
+            };
+            let top = p + (q - p) * fu[i];
+            let bottom = r + (s - r) * fu[i];
+            *out = top + (bottom - top) * fv[i];
+        }
     }
 }
