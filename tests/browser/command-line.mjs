@@ -2,7 +2,7 @@
 import { execFile } from 'node:child_process';
 import { promisify } from 'node:util';
 import { join } from 'node:path';
-import { buildEnv } from '../../tools/env.mjs';
+import { buildEnv, gpu } from '../../tools/env.mjs';
 import { must, root } from '../../tools/run.mjs';
 
 const program = join(root, 'target/release/ipdrecon');
@@ -13,6 +13,13 @@ export const build = () => must('cargo', ['test', '--release', '--workspace', '-
 
 /** Fuses a scan into a mesh. */
 export const fuse = (scan, out) => execute(program, ['fuse', scan, '-o', out]);
+
+/** Depth from the photos of a scan, into a mesh. */
+export const stereo = (scan, out, { views, size, device = 'cpu' }) =>
+  execute(program, ['stereo', scan, '-o', out, '--views', String(views), '--size', size, '--device', device], { env: gpu(buildEnv()) });
+
+/** Writes the sample room as a folder of files. */
+export const sampleFolder = (folder) => execute(join(root, 'target/release/examples/sample_folder'), [folder]);
 
 /** The figures of a mesh, as the object that `--json` prints. */
 export async function judge(pred, gt, protocol, scan) {

@@ -38,6 +38,26 @@ test('a folder dropped on the element becomes a mesh, with the options of its at
   await visitor.close();
 });
 
+test('attributes choose stereo, its size and its views', async () => {
+  const visitor = await open('<ipd-recon review depth="stereo" views="6" stereo-size="160x120"></ipd-recon>');
+  const { page } = visitor;
+  await visitor.until('idle');
+  const plans = await page.evaluate(async () => {
+    const element = document.querySelector('ipd-recon');
+    const asked = await element.openSample();
+    return [asked, await element.replan({ depth: 'sensor', views: undefined })];
+  });
+  assert.deepEqual(plans.map(({ depth }) => depth), ['stereo', 'sensor']);
+  assert.deepEqual(plans[0].options.stereoSize, { widthPx: 160, heightPx: 120 });
+  assert.equal(plans[0].keyframes, 6);
+  assert.ok(plans[1].keyframes > 6, 'the sensor is asked for every keyframe');
+  const status = () => page.evaluate(() => document.querySelector('ipd-recon').shadowRoot.querySelector('[role=status]').textContent);
+  assert.doesNotMatch(await status(), /estimated/);
+  await page.evaluate(() => document.querySelector('ipd-recon').replan());
+  assert.match(await status(), /depth will be estimated from the photos/);
+  await visitor.close();
+});
+
 test('an idle element leaves wheel and keys to the page', async () => {
   const visitor = await open('<ipd-recon></ipd-recon>');
   const { page } = visitor;

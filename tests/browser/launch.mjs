@@ -71,11 +71,16 @@ export class Visitor {
   }
 
   /** Waits until the element is in one of these states; a failure that was not asked for ends the wait with its words. */
-  async until(...states) {
+  until(...states) {
+    return this.within(180_000, ...states);
+  }
+
+  /** As `until`, with another limit in milliseconds. */
+  async within(timeout, ...states) {
     const reached = await this.page.waitForFunction((states) => {
       const { state } = document.querySelector('ipd-recon');
       return states.includes(state) || state === 'failed' ? state : false;
-    }, states, { timeout: 180_000, polling: 50 });
+    }, states, { timeout, polling: 50 });
     const state = await reached.jsonValue();
     if (!states.includes(state)) throw new Error(`wanted ${states}, got: ${JSON.stringify(await this.events('failed'))} ${JSON.stringify(await this.events('finding'))}`);
     // The page draws a state in the frame after it.

@@ -71,6 +71,6 @@ export class Announcer {
 }
 
 function planned({ keyframes, frames, depth }: PlanSummary): string {
-  const source = depth === "stereo" ? ", depth will be estimated from the pictures" : "";
+  const source = depth === "stereo" ? ", depth will be estimated from the photos" : "";
   return `Planned: ${count(keyframes)} of ${counted(frames, "frame")} kept${source}.`;
 }

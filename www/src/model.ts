@@ -11,6 +11,8 @@ export interface Model {
   opened?: EventOf<"opened">;
   plan?: PlanSummary;
   findings: FindingMessage[];
+  /** How many of the findings are about the scan itself: those of a run go when it is run again. */
+  ofScan: number;
   stage?: StageName;
   progress?: EventOf<"progress">;
   triangles: number;
@@ -21,15 +23,16 @@ export interface Model {
 
 /** What a page knows that has just been opened. */
 export function blank(): Model {
-  return { state: "starting", findings: [], triangles: 0 };
+  return { state: "starting", findings: [], ofScan: 0, triangles: 0 };
 }
 
 /** Takes a new state in. A scan that is being opened begins with nothing; a new engine has not said what it is yet. */
 export function enter(model: Model, state: State): Model {
   if (state === "opening") return { ...blank(), ready: model.ready, state };
   if (state === "starting") return { ...blank(), state };
+  if (state === "planned") return { ...model, state, ofScan: model.findings.length };
   if (state === "running" && model.state !== "paused") {
-    return { ...model, state, finished: undefined, stage: undefined, progress: undefined, exportFailed: undefined };
+    return { ...model, state, findings: model.findings.slice(0, model.ofScan), finished: undefined, stage: undefined, progress: undefined, exportFailed: undefined };
   }
   return { ...model, state };
 }

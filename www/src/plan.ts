@@ -38,9 +38,9 @@ export function drawPlan({ state, plan, ready, opened }: Model): void {
   const stereo = plan.depth === "stereo";
   const { voxelSizeM, maxDepthM, stereoSize } = plan.options;
   list(byId("plan-list"), [
-    ["Depth", stereo ? "estimated from photos" : "from the depth sensor"],
     ["Frames kept", `${count(plan.keyframes)} of ${count(plan.frames)}`],
     // Where they can be chosen, the menus say it.
+    ...(choosing ? [] : [["Depth", stereo ? "estimated from photos" : "from the sensor"] as const]),
     ...(choosing || !stereo ? [] : [["Photos scaled to", pixels(stereoSize)] as const]),
     ...(choosing ? [] : [["Voxel size", centimetres(voxelSizeM)] as const, ["Depth up to", `${plain(maxDepthM)} m`] as const]),
     ["Bricks", `about ${count(plan.bricks)}`],
@@ -52,7 +52,7 @@ export function drawPlan({ state, plan, ready, opened }: Model): void {
   drawSource(plan.depth, opened);
   select(voxel, String(plain(voxelSizeM)), centimetres(voxelSizeM));
   const { every, views } = plan.options;
-  select(kept, `${every}/${views ?? ""}`, [every > 1 ? `every ${every}th` : "", views ? `${views}, spread evenly` : ""].filter(Boolean).join(", "));
+  select(kept, `${every}/${views ?? ""}`, [views ? `${views}` : "", every > 1 ? `every ${every}th` : ""].filter(Boolean).join(" of "));
   select(depth, String(plain(maxDepthM)), `${plain(maxDepthM)} m`);
   if (stereo) select(size, `${stereoSize.widthPx}x${stereoSize.heightPx}`, pixels(stereoSize));
   drawSize();
@@ -64,9 +64,9 @@ function drawSource(chosen: DepthSource, opened: Model["opened"]): void {
   const { hasDepth = true, hasColor = true } = opened ?? {};
   source.disabled = !hasDepth || !hasColor;
   const note = byId("depth-note");
-  if (!hasDepth) write(note, "This scan has no depth images, so depth is estimated by comparing its photos. Walls without any texture may stay open.");
+  if (!hasDepth) write(note, "This scan has no depth images: depth is estimated from its photos. Walls without any texture may stay open.");
   else if (!hasColor) write(note, "This scan has no photos to estimate depth from.");
-  else write(note, chosen === "stereo" ? "Takes longer than the sensor's depth. Walls without any texture may stay open." : "");
+  else write(note, chosen === "stereo" ? "Depth is estimated from the photos, which takes longer. Walls without any texture may stay open." : "");
 }
 
 /** Photos are scaled for stereo alone. */
