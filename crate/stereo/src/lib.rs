@@ -5,6 +5,7 @@ pub mod consistency;
 pub mod depth;
 mod driver;
 mod error;
+pub mod fused;
 pub mod planes;
 pub mod smooth;
 pub mod sources;

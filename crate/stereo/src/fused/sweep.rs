@@ -1,0 +1,379 @@
+//! The plane sweep as three kernels a chunk of planes: every source warped into the reference, windows correlated, the
+//! best share of the sources kept.
+//!
+//! Between them lie samples and scores of 16 bits, two planes in one: a bilinear sample is made once and then used by
+//! all windows it falls into. A picture of samples has a frame of zeros as wide as a window reaches, so that windows
+//! need no borders: what lies outside adds nothing to any sum.
+
+use super::pack::{COST_STEPS, GRAY_STEPS, SCORE_STEPS, high, low, pack};
+use cubecl::prelude::*;
+
+/// Two planes at a pixel.
+type Two = Vector<f32, Const<2>>;
+
+/// Four planes at a pixel.
+pub(super) type Four = Vector<f32, Const<4>>;
+
+/// Four packed costs at a pixel.
+pub(super) type Packed = Vector<i32, Const<2>>;
+
+/// Threads of a workgroup of the warp, along x and y.
+pub(super) const TILE: (u32, u32) = (16, 4);
+
+/// Threads of a workgroup of the windows, along x.
+pub(super) const STRIP: u32 = 32;
+
+/// Windows beside each other that a thread correlates: they share most of their samples.
+pub(super) const WIDE: usize = 2;
+
+/// Rows that a thread of the windows walks down.
+pub(super) const SEGMENT: u32 = 32;
+
+/// Threads of a workgroup where a thread is a pixel.
+pub(super) const THREADS: u32 = 64;
+
+/// Numbers that a source has in `warps`: `a` (9) and `b` (3) of [`crate::view::Warp`], the largest x and y that can be
+/// sampled, and the length of a row.
+pub(super) const WARP: usize = 16;
+
+/// The score of a source that does not see the point, in steps.
+const NONE: f32 = -32_000.0;
+
+/// A thread is a pixel of the framed reference and a source; it goes through the planes of the chunk.
+///
+/// `warped`: `[pairs, sources, height + 2 radius, width + 2 radius]`.
+#[cube(launch_unchecked)]
+#[allow(clippy::too_many_arguments)]
+pub(super) fn warp_kernel(
+    sources: &[i32],
+    warps: &[f32],
+    base: &[f32],
+    warped: &mut [i32],
+    width: u32,
+    height: u32,
+    slot: u32,
+    first_pair: u32,
+    pairs: u32,
+    first_rho: f32,
+    step: f32,
+    #[comptime] radius: u32,
+    #[comptime] has_base: bool,
+) {
+    let across = width + 2 * radius;
+    let down = height + 2 * radius;
+    let x = CUBE_POS_X * CUBE_DIM_X + UNIT_POS_X;
+    let y = CUBE_POS_Y * CUBE_DIM_Y + UNIT_POS_Y;
+    if x >= across || y >= down {
+        terminate!();
+    }
+    let source = CUBE_POS_Z;
+    let mut to = ((source * down + y) * across + x) as usize;
+    let stride = (CUBE_COUNT_Z * down * across) as usize;
+
+    let inside = x >= radius && y >= radius && x < width + radius && y < height + radius;
+    let x = x - radius;
+    let y = y - radius;
+    let mut from = 0.0f32;
+    if comptime!(has_base) && inside {
+        from = base[(y * width + x) as usize];
+    }
+    let xf = x as f32;
+    let yf = y as f32;
+    let w = source as usize * WARP;
+    let u0 = warps[w] * xf + (warps[w + 1] * yf + warps[w + 2]);
+    let v0 = warps[w + 3] * xf + (warps[w + 4] * yf + warps[w + 5]);
+    let z0 = warps[w + 6] * xf + (warps[w + 7] * yf + warps[w + 8]);
+    let bu = warps[w + 9];
+    let bv = warps[w + 10];
+    let bz = warps[w + 11];
+    let most_x = warps[w + 12];
+    let most_y = warps[w + 13];
+    let pitch = warps[w + 14] as i32;
+    let start = (source * slot) as i32;
+    for pair in 0..pairs {
+        let mut out = 0i32;
+        if inside {
+            let plane = ((first_pair + pair) * 2) as f32;
+            let mut values = Two::new(0.0f32);
+            #[unroll]
+            for p in 0..2usize {
+                let mut rho = first_rho + step * (plane + comptime!(p as f32));
+                if comptime!(has_base) {
+                    rho = (rho + from).max(1e-3f32);
+                }
+                let inv = 1.0f32 / (z0 + bz * rho).max(1e-6f32);
+                let u = ((u0 + bu * rho) * inv).max(0.0f32).min(most_x);
+                let v = ((v0 + bv * rho) * inv).max(0.0f32).min(most_y);
+                let iu = u as i32;
+                let iv = v as i32;
+                let fu = u - iu as f32;
+                let fv = v - iv as f32;
+                let at = start + iv * pitch + iu;
+                let upper = sources[at as usize];
+                let lower = sources[(at + pitch) as usize];
+                let top = low(upper) + (high(upper) - low(upper)) * fu;
+                let bottom = low(lower) + (high(lower) - low(lower)) * fu;
+                values.insert(p, top + (bottom - top) * fv);
+            }
+            out = pack(values.extract(0usize), values.extract(1usize));
+        }
+        warped[to] = out;
+        to += stride;
+    }
+}
+
+/// Pixels of a window along one axis of the picture.
+#[cube]
+fn window(x: u32, length: u32, #[comptime] radius: u32) -> f32 {
+    let low = x - x.min(radius);
+    let high = (x + radius + 1).min(length);
+    (high - low) as f32
+}
+
+#[cube]
+fn unpack(pair: i32) -> Two {
+    let mut values = Two::new(low(pair));
+    values.insert(1usize, high(pair));
+    values
+}
+
+/// ZNCC of every window. A thread is `wide` columns, a segment of rows and a source; it walks down the segment with the
+/// sums of the last `2 radius + 1` rows of its windows at hand, for one pair of planes after the other.
+///
+/// `gray`: the framed reference, each pixel with its right neighbour. `scores`: `[pairs, sources, height, width]`.
+#[cube(launch_unchecked)]
+#[allow(clippy::too_many_arguments)]
+pub(super) fn window_kernel(
+    warped: &[i32],
+    gray: &[i32],
+    warps: &[f32],
+    base: &[f32],
+    scores: &mut [i32],
+    width: u32,
+    height: u32,
+    first_pair: u32,
+    pairs: u32,
+    first_rho: f32,
+    step: f32,
+    noise_var: f32,
+    #[comptime] radius: u32,
+    #[comptime] wide: usize,
+    #[comptime] has_base: bool,
+) {
+    let side = comptime!((2 * radius + 1) as usize);
+    let x = (CUBE_POS_X * CUBE_DIM_X + UNIT_POS_X) * comptime!(wide as u32);
+    if x >= width {
+        terminate!();
+    }
+    let source = CUBE_POS_Z;
+    let top = CUBE_POS_Y * SEGMENT;
+    let end = (top + SEGMENT).min(height);
+    let across = width + 2 * radius;
+    let down = height + 2 * radius;
+    let w = source as usize * WARP;
+    let ux = warps[w];
+    let uy = warps[w + 1];
+    let vx = warps[w + 3];
+    let vy = warps[w + 4];
+    let zx = warps[w + 6];
+    let zy = warps[w + 7];
+    let u0 = ux * x as f32 + warps[w + 2];
+    let v0 = vx * x as f32 + warps[w + 5];
+    let z0 = zx * x as f32 + warps[w + 8];
+    let bu = warps[w + 9];
+    let bv = warps[w + 10];
+    let bz = warps[w + 11];
+    let most_x = warps[w + 12];
+    let most_y = warps[w + 13];
+    let mut ring_s = Array::<Two>::new(comptime!(side * wide));
+    let mut ring_ss = Array::<Two>::new(comptime!(side * wide));
+    let mut ring_rs = Array::<Two>::new(comptime!(side * wide));
+    let mut ring_r = Array::<f32>::new(comptime!(side * wide));
+    let mut ring_rr = Array::<f32>::new(comptime!(side * wide));
+    let columns = comptime!(side + wide - 1);
+    let mut column_s = Array::<Two>::new(columns);
+    let mut column_r = Array::<f32>::new(comptime!(columns + 1));
+    let rounds = (end - top + 2 * radius).div_ceil(2 * radius + 1);
+    for pair in 0..pairs {
+        let slice = pair * CUBE_COUNT_Z + source;
+        let from = slice * across * down + x;
+        let to = slice * width * height + x;
+        let plane = ((first_pair + pair) * 2) as f32;
+        let mut planes = Two::new(first_rho + step * plane);
+        planes.insert(1usize, first_rho + step * (plane + 1.0f32));
+        for round in 0..rounds {
+            #[unroll]
+            for j in 0..side {
+                // The row of the framed picture that comes in below.
+                let below = top + round * (2 * radius + 1) + j as u32;
+                let row = below.min(down - 1) * across;
+                let line = (from + row) as usize;
+                let shade = (row + x) as usize;
+                #[unroll]
+                for k in 0..comptime!(columns.div_ceil(2)) {
+                    let two = gray[shade + comptime!(2 * k)];
+                    column_r[comptime!(2 * k)] = low(two);
+                    column_r[comptime!(2 * k + 1)] = high(two);
+                }
+                #[unroll]
+                for k in 0..columns {
+                    column_s[k] = unpack(warped[line + k]);
+                }
+                // Sums over the columns that all windows of the thread have in common, then those that each has beside.
+                let mut s = Two::new(0.0f32);
+                let mut ss = Two::new(0.0f32);
+                let mut rs = Two::new(0.0f32);
+                let mut r = 0.0f32;
+                let mut rr = 0.0f32;
+                #[unroll]
+                for k in comptime!(wide - 1)..side {
+                    let v = column_s[k];
+                    let g = column_r[k];
+                    s += v;
+                    ss += v * v;
+                    rs += v * Two::new(g);
+                    r += g;
+                    rr += g * g;
+                }
+                #[unroll]
+                for i in 0..wide {
+                    let mut own_s = s;
+                    let mut own_ss = ss;
+                    let mut own_rs = rs;
+                    let mut own_r = r;
+                    let mut own_rr = rr;
+                    #[unroll]
+                    for k in 0..comptime!(wide - 1) {
+                        let beside = comptime!(if k + i + 1 < wide {
+                            i + k
+                        } else {
+                            side + k + i + 1 - wide
+                        });
+                        let v = column_s[beside];
+                        let g = column_r[beside];
+                        own_s += v;
+                        own_ss += v * v;
+                        own_rs += v * Two::new(g);
+                        own_r += g;
+                        own_rr += g * g;
+                    }
+                    let kept = comptime!(j * wide + i);
+                    ring_s[kept] = own_s;
+                    ring_ss[kept] = own_ss;
+                    ring_rs[kept] = own_rs;
+                    ring_r[kept] = own_r;
+                    ring_rr[kept] = own_rr;
+                }
+                if below >= top + 2 * radius && below < end + 2 * radius {
+                    let y = below - 2 * radius;
+                    let yf = y as f32;
+                    let rows = window(y, height, radius);
+                    #[unroll]
+                    for i in 0..wide {
+                        let mut s = ring_s[i];
+                        let mut ss = ring_ss[i];
+                        let mut rs = ring_rs[i];
+                        let mut r = ring_r[i];
+                        let mut rr = ring_rr[i];
+                        #[unroll]
+                        for k in 1..side {
+                            s += ring_s[comptime!(k * wide + i)];
+                            ss += ring_ss[comptime!(k * wide + i)];
+                            rs += ring_rs[comptime!(k * wide + i)];
+                            r += ring_r[comptime!(k * wide + i)];
+                            rr += ring_rr[comptime!(k * wide + i)];
+                        }
+                        let own_x = x + comptime!(i as u32);
+                        let n = rows * window(own_x.min(width - 1), width, radius);
+                        let per = 1.0f32 / n;
+                        let covariance = rs - s * Two::new(r * per);
+                        let noise = noise_var * (n * (GRAY_STEPS * GRAY_STEPS));
+                        let var_r = (rr - r * r * per).max(0.0f32) + noise;
+                        let var_s = ss - s * s * Two::new(per);
+                        let var_s = max(var_s, Two::new(0.0f32)) + Two::new(noise);
+                        let score = covariance * (Two::new(var_r) * var_s).inverse_sqrt();
+                        let mut rho = planes;
+                        if comptime!(has_base) {
+                            let from = base[(y * width + own_x.min(width - 1)) as usize];
+                            rho = max(planes + Two::new(from), Two::new(1e-3f32));
+                        }
+                        let shift = comptime!(i as f32);
+                        let z = Two::new(z0 + zx * shift + zy * yf) + Two::new(bz) * rho;
+                        let u = Two::new(u0 + ux * shift + uy * yf) + Two::new(bu) * rho;
+                        let v = Two::new(v0 + vx * shift + vy * yf) + Two::new(bv) * rho;
+                        // 0 <= u / z <= most with z > 0, without the division.
+                        let room_x = min(u, Two::new(most_x) * z - u);
+                        let room_y = min(v, Two::new(most_y) * z - v);
+                        let room = min(min(room_x, room_y), z - Two::new(1e-6f32));
+                        let sees = room.greater_equal(&Two::new(0.0f32));
+                        let steps = score * Two::new(SCORE_STEPS);
+                        let out = select_many(sees, steps, Two::new(NONE));
+                        if own_x < width {
+                            scores[(to + y * width) as usize + i] =
+                                pack(out.extract(0usize), out.extract(1usize));
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// 1 - the mean of the best share of the scores. A thread is a pixel and four planes; it holds the best `kept` scores in order.
+///
+/// `cost`: `[pixels, groups]`, a row of all planes for every pixel.
+#[cube(launch_unchecked)]
+#[allow(clippy::too_many_arguments)]
+pub(super) fn best_kernel(
+    scores: &[i32],
+    cost: &mut [Packed],
+    pixels: u32,
+    sources: u32,
+    groups: u32,
+    first_group: u32,
+    best: f32,
+    #[comptime] kept: usize,
+) {
+    let at = CUBE_POS_X * THREADS + UNIT_POS_X;
+    if at >= pixels {
+        terminate!();
+    }
+    let group = CUBE_POS_Y;
+    let mut top = Array::<Four>::new(kept);
+    #[unroll]
+    for k in 0..kept {
+        top[k] = Four::new(NONE);
+    }
+    let mut seen = Four::new(0.0f32);
+    let mut from = 2 * group * sources * pixels + at;
+    for _ in 0..sources {
+        let a = scores[from as usize];
+        let b = scores[(from + sources * pixels) as usize];
+        from += pixels;
+        let mut score = Four::new(low(a));
+        score.insert(1usize, high(a));
+        score.insert(2usize, low(b));
+        score.insert(3usize, high(b));
+        let sees = score.greater_than(&Four::new(NONE));
+        seen += select_many(sees, Four::new(1.0f32), Four::new(0.0f32));
+        #[unroll]
+        for k in 0..kept {
+            let held = top[k];
+            top[k] = max(held, score);
+            score = min(held, score);
+        }
+    }
+    let share = max((seen * Four::new(best)).ceil(), Four::new(1.0f32));
+    let mut sum = Four::new(0.0f32);
+    #[unroll]
+    for k in 0..kept {
+        let counts = share.greater_than(&Four::new(k as f32));
+        sum += select_many(counts, top[k], Four::new(0.0f32));
+    }
+    let known = seen.greater_than(&Four::new(0.0f32));
+    let mean = select_many(known, sum / share, Four::new(0.0f32));
+    let out = (Four::new(1.0f32) - mean * Four::new(1.0f32 / SCORE_STEPS)) * Four::new(COST_STEPS);
+    let mut packed = Packed::new(pack(out.extract(0usize), out.extract(1usize)));
+    packed.insert(1usize, pack(out.extract(2usize), out.extract(3usize)));
+    cost[(at * groups + first_group + group) as usize] = packed;
+}
