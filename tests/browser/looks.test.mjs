@@ -45,6 +45,11 @@ for (const [width, height] of [[1280, 800], [360, 740]]) {
       await page.setInputFiles('#zip-input', { name: 'notes.zip', mimeType: 'application/zip', buffer: Buffer.from('no archive') });
       await visitor.until('failed');
       await inspect(visitor, name('failed'));
+      await page.goto(`${browser.url}?sample&autostart=0`);
+      await visitor.until('planned');
+      await page.getByLabel('Depth from').selectOption('the photos');
+      await page.getByLabel('Photos scaled to').waitFor();
+      await inspect(visitor, name('plan'));
       await visitor.close();
     });
   }
