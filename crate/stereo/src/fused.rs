@@ -5,6 +5,7 @@
 //! is ever looked at pixel by pixel: [`sweep`] has the layout, [`smooth`] the paths. Only the winners' maps are read back.
 
 mod pack;
+mod pictures;
 mod shape;
 mod smooth;
 mod sweep;
@@ -23,16 +24,14 @@ use crate::{
 };
 use burn::{
     Tensor,
-    tensor::{DType, Device, Int, TensorData},
+    tensor::{DType, Device, Int},
 };
 use burn_cubecl::{CubeBackend, tensor::CubeTensor};
 use cubecl::prelude::*;
+use pictures::{Pictures, framed, upload};
 use shape::{PLANES_A_STEP, Shape, shape};
 use smooth::{DIRECTIONS, LANES, LINES};
 use sweep::{SEGMENT, STRIP, THREADS, TILE, WARP, WIDE};
-
-/// The middle of the grey scale: sums of squares lose least around it.
-const CENTER: f32 = 128.0;
 
 /// Samples of a chunk of planes fill at most this much, as long as four planes do; scores as much again.
 const SCRATCH_BYTES: usize = 32 << 20;
@@ -41,6 +40,7 @@ const SCRATCH_BYTES: usize = 32 << 20;
 #[derive(Debug)]
 pub struct FusedMatcher {
     device: Device,
+    pictures: Option<Pictures>,
 }
 
 /// Costs of all planes at all pixels of a picture, on the device.
@@ -73,20 +73,22 @@ impl FusedMatcher {
         float_buffer(Tensor::zeros([1], (device, DType::F32)))?;
         Ok(Self {
             device: device.clone(),
+            pictures: None,
         })
     }
 
     /// The best plane of every pixel of `reference`: [`crate::sweep::sweep`], [`crate::smooth::smooth`] and
     /// [`crate::depth::winners`] in one.
     ///
-    /// `base` (1/m, one a pixel) is added to the `offsets` (1/m, evenly spaced).
+    /// Sources come with a number each: the same number, the same picture; those of late are not brought to the device
+    /// again. `base` (1/m, one a pixel) is added to the `offsets` (1/m, evenly spaced).
     ///
     /// # Errors
     /// As [`Self::sweep`] and [`Self::winners`].
     pub async fn match_view(
-        &self,
+        &mut self,
         reference: &View,
-        sources: &[&View],
+        sources: &[(usize, &View)],
         base: Option<&[f32]>,
         offsets: &[f32],
         sweep: &SweepConfig,
@@ -103,9 +105,9 @@ impl FusedMatcher {
     /// [`StereoError::Setting`] without a source, for offsets that are not evenly spaced, or for more planes or sources
     /// than [`most_planes`] and [`most_sources`] allow; [`StereoError::Device`] if the device fails.
     pub fn sweep(
-        &self,
+        &mut self,
         reference: &View,
-        sources: &[&View],
+        sources: &[(usize, &View)],
         base: Option<&[f32]>,
         offsets: &[f32],
         config: &SweepConfig,
@@ -114,17 +116,20 @@ impl FusedMatcher {
         let Shape { width, height, .. } = shape;
         let (count, radius) = (sources.len(), config.radius);
         let (across, down) = (width + 2 * radius, height + 2 * radius);
-        let slot = sources.iter().map(|v| v.gray.len()).max().unwrap_or(0);
         let groups = shape.padded() / 4;
         let group_samples = 2 * count * across * down;
         let chunk = (SCRATCH_BYTES / (4 * group_samples)).clamp(1, groups);
 
-        let (pictures, warps) = pictures_and_warps(reference, sources, slot);
-        let pictures = self.ints(pictures)?;
-        let warps = self.floats(warps)?;
-        let framed = self.ints(pack::framed_shades(&reference.gray, width, radius))?;
-        let gray = self.floats(reference.gray.clone())?;
-        let base = base.map(|b| self.floats(b.to_vec())).transpose()?;
+        let slot = sources.iter().map(|(_, v)| v.gray.len()).max().unwrap_or(0);
+        let mut pictures = match self.pictures.take() {
+            Some(pictures) if pictures.fits(slot, count) => pictures,
+            _ => Pictures::new(&self.device, slot, count)?,
+        };
+        let places = pictures.places(&self.device, sources)?;
+        let warps = upload(&self.device, warps(reference, sources, &places))?;
+        let gray = upload(&self.device, reference.gray.clone())?;
+        let framed = framed(&self.device, &gray, width, height, radius)?;
+        let base = base.map(|b| upload(&self.device, b.to_vec())).transpose()?;
         let has_base = base.is_some();
         let base_or_any = base.clone().unwrap_or_else(|| gray.clone());
         // The last thread of a row reads past the end by less than a window.
@@ -152,13 +157,13 @@ impl FusedMatcher {
                         n,
                     ),
                     CubeDim::new_2d(TILE.0, TILE.1),
-                    pictures.clone().into_buffer_arg(),
+                    pictures.buffer.clone().into_buffer_arg(),
                     warps.clone().into_buffer_arg(),
                     base_or_any.clone().into_buffer_arg(),
                     warped.clone().into_buffer_arg(),
                     w,
                     h,
-                    slot as u32,
+                    pictures.slot as u32,
                     2 * first,
                     2 * many,
                     shape.first_rho,
@@ -168,7 +173,11 @@ impl FusedMatcher {
                 );
                 sweep::window_kernel::launch_unchecked(
                     client,
-                    CubeCount::Static(w.div_ceil(STRIP * WIDE as u32), h.div_ceil(SEGMENT), n),
+                    CubeCount::Static(
+                        w.div_ceil(STRIP * WIDE as u32),
+                        h.div_ceil(SEGMENT),
+                        2 * many * n,
+                    ),
                     CubeDim::new_1d(STRIP),
                     warped.clone().into_buffer_arg(),
                     framed.clone().into_buffer_arg(),
@@ -177,8 +186,8 @@ impl FusedMatcher {
                     scores.clone().into_buffer_arg(),
                     w,
                     h,
+                    n,
                     2 * first,
-                    2 * many,
                     shape.first_rho,
                     shape.step,
                     config.noise_var,
@@ -201,6 +210,7 @@ impl FusedMatcher {
                 );
             }
         }
+        self.pictures = Some(pictures);
         Ok(Costs {
             shape,
             cost,
@@ -283,22 +293,6 @@ impl FusedMatcher {
         Ok(Raw { rho, zncc, unique })
     }
 
-    fn floats(&self, values: Vec<f32>) -> Result<CubeTensor, StereoError> {
-        let shape = [values.len()];
-        float_buffer(Tensor::from_data(
-            TensorData::new(values, shape),
-            (&self.device, DType::F32),
-        ))
-    }
-
-    fn ints(&self, values: Vec<i32>) -> Result<CubeTensor, StereoError> {
-        let shape = [values.len()];
-        int_buffer(Tensor::from_data(
-            TensorData::new(values, shape),
-            (&self.device, DType::I32),
-        ))
-    }
-
     fn empty_floats(&self, length: usize) -> Result<CubeTensor, StereoError> {
         float_buffer(Tensor::empty([length], (&self.device, DType::F32)))
     }
@@ -308,20 +302,17 @@ impl FusedMatcher {
     }
 }
 
-/// The sources' grey values, each in a slot of `slot` pixels, and [`WARP`] numbers of each.
-fn pictures_and_warps(reference: &View, sources: &[&View], slot: usize) -> (Vec<i32>, Vec<f32>) {
-    let mut pictures = Vec::with_capacity(sources.len() * slot);
-    let mut warps = Vec::with_capacity(sources.len() * WARP);
-    for (i, source) in sources.iter().enumerate() {
-        pictures.extend(pack::shades(&source.gray));
-        pictures.resize((i + 1) * slot, 0);
+/// [`WARP`] numbers of each source.
+fn warps(reference: &View, sources: &[(usize, &View)], places: &[usize]) -> Vec<f32> {
+    let mut numbers = Vec::with_capacity(sources.len() * WARP);
+    for ((_, source), place) in sources.iter().zip(places) {
         let to_source = warp(reference, source);
         let (width, height) = (source.camera.width as f32, source.camera.height as f32);
-        warps.extend(to_source.a);
-        warps.extend(to_source.b);
-        warps.extend([width - 1.001, height - 1.001, width, 0.0]);
+        numbers.extend(to_source.a);
+        numbers.extend(to_source.b);
+        numbers.extend([width - 1.001, height - 1.001, width, *place as f32]);
     }
-    (pictures, warps)
+    numbers
 }
 
 /// The device's own handle of a float tensor.

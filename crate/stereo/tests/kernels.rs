@@ -175,8 +175,8 @@ async fn on_device(
     config: &SweepConfig,
 ) -> Raw {
     let (reference, views) = (reference(), sources());
-    let views: Vec<&View> = views.iter().collect();
-    let matcher = FusedMatcher::new(device).expect("a device that runs kernels");
+    let views: Vec<(usize, &View)> = views.iter().enumerate().collect();
+    let mut matcher = FusedMatcher::new(device).expect("a device that runs kernels");
     let raw = matcher.match_view(&reference, &views, base, offsets, config, &SMOOTH);
     raw.await.expect("maps")
 }
@@ -227,13 +227,33 @@ on_gpu! {
 }
 
 on_gpu! {
+    /// Sources stay on the device until others need their place, and are brought again then.
+    async fn kept_pictures_change_nothing(device: Device) {
+        let config = SweepConfig { radius: 1, noise_var: 1.0, best: 0.5 };
+        let offsets = spaced(0.2, 1.0, 32);
+        let (view, views) = (reference(), sources());
+        let few: Vec<(usize, &View)> = views.iter().enumerate().collect();
+        let turned: Vec<(usize, &View)> = few.iter().rev().copied().collect();
+        let mut matcher = FusedMatcher::new(&device).expect("a device that runs kernels");
+        let mut maps = Vec::new();
+        let others = |from: usize| (from..from + 20).map(|key| (key, &views[key % 4])).collect();
+        for sources in [few.clone(), turned, others(100), others(200), few] {
+            let raw = matcher.match_view(&view, &sources, None, &offsets, &config, &SMOOTH);
+            maps.push(raw.await.expect("maps").rho);
+        }
+        assert_eq!(maps[0], maps[1]);
+        assert_eq!(maps[0], maps[4]);
+    }
+}
+
+on_gpu! {
     /// What does not fit or makes no sense is refused in words, before the device is asked.
     async fn refusals(device: Device) {
         let config = SweepConfig { radius: 2, noise_var: 1.0, best: 0.5 };
-        let matcher = FusedMatcher::new(&device).expect("a device that runs kernels");
+        let mut matcher = FusedMatcher::new(&device).expect("a device that runs kernels");
         let (view, views) = (reference(), sources());
-        let views: Vec<&View> = views.iter().collect();
-        let refused = |sources: &[&View], offsets: &[f32]| {
+        let views: Vec<(usize, &View)> = views.iter().enumerate().collect();
+        let mut refused = |sources: &[(usize, &View)], offsets: &[f32]| {
             let costs = matcher.sweep(&view, sources, None, offsets, &config);
             matches!(costs, Err(StereoError::Setting { .. }))
         };

@@ -4,7 +4,7 @@ use super::smooth::LANES;
 use crate::{StereoError, view::View};
 
 /// The largest binding that WebGPU guarantees.
-const BINDING_BYTES: usize = 128 << 20;
+pub(super) const BINDING_BYTES: usize = 128 << 20;
 
 /// Planes come in groups that divide evenly among the threads of a line.
 pub(super) const PLANES_A_STEP: usize = 4 * LANES;
@@ -46,7 +46,7 @@ impl Shape {
 /// The sizes, if the kernels can do them.
 pub(super) fn shape(
     reference: &View,
-    sources: &[&View],
+    sources: &[(usize, &View)],
     offsets: &[f32],
     radius: usize,
 ) -> Result<Shape, StereoError> {
@@ -61,7 +61,7 @@ pub(super) fn shape(
     }
     let largest = sources
         .iter()
-        .map(|view| size(view))
+        .map(|(_, view)| size(view))
         .chain([(width, height)]);
     let largest = largest.fold((0, 0), |a, b| (a.0.max(b.0), a.1.max(b.1)));
     let most = most_sources(largest.0, largest.1, radius);
@@ -75,11 +75,11 @@ pub(super) fn shape(
             found,
         );
     }
-    let odd = sources.iter().find(|view| {
+    let odd = sources.iter().find(|(_, view)| {
         let (width, height) = size(view);
         width < 2 || height < 2 || view.gray.len() != width * height
     });
-    if let Some(view) = odd {
+    if let Some((_, view)) = odd {
         let (width, height) = size(view);
         let found = format!("{width}x{height} with {} values", view.gray.len());
         return fault(

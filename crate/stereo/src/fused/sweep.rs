@@ -33,7 +33,7 @@ pub(super) const SEGMENT: u32 = 32;
 pub(super) const THREADS: u32 = 64;
 
 /// Numbers that a source has in `warps`: `a` (9) and `b` (3) of [`crate::view::Warp`], the largest x and y that can be
-/// sampled, and the length of a row.
+/// sampled, the length of a row, and the place among the pictures.
 pub(super) const WARP: usize = 16;
 
 /// The score of a source that does not see the point, in steps.
@@ -45,7 +45,7 @@ const NONE: f32 = -32_000.0;
 #[cube(launch_unchecked)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn warp_kernel(
-    sources: &[i32],
+    pictures: &[i32],
     warps: &[f32],
     base: &[f32],
     warped: &mut [i32],
@@ -89,7 +89,7 @@ pub(super) fn warp_kernel(
     let most_x = warps[w + 12];
     let most_y = warps[w + 13];
     let pitch = warps[w + 14] as i32;
-    let start = (source * slot) as i32;
+    let start = warps[w + 15] as i32 * slot as i32;
     for pair in 0..pairs {
         let mut out = 0i32;
         if inside {
@@ -109,8 +109,8 @@ pub(super) fn warp_kernel(
                 let fu = u - iu as f32;
                 let fv = v - iv as f32;
                 let at = start + iv * pitch + iu;
-                let upper = sources[at as usize];
-                let lower = sources[(at + pitch) as usize];
+                let upper = pictures[at as usize];
+                let lower = pictures[(at + pitch) as usize];
                 let top = low(upper) + (high(upper) - low(upper)) * fu;
                 let bottom = low(lower) + (high(lower) - low(lower)) * fu;
                 values.insert(p, top + (bottom - top) * fv);
@@ -137,8 +137,8 @@ fn unpack(pair: i32) -> Two {
     values
 }
 
-/// ZNCC of every window. A thread is `wide` columns, a segment of rows and a source; it walks down the segment with the
-/// sums of the last `2 radius + 1` rows of its windows at hand, for one pair of planes after the other.
+/// ZNCC of every window. A thread is `wide` columns, a segment of rows, a source and a pair of planes; it walks down the
+/// segment with the sums of the last `2 radius + 1` rows of its windows at hand.
 ///
 /// `gray`: the framed reference, each pixel with its right neighbour. `scores`: `[pairs, sources, height, width]`.
 #[cube(launch_unchecked)]
@@ -151,8 +151,8 @@ pub(super) fn window_kernel(
     scores: &mut [i32],
     width: u32,
     height: u32,
+    sources: u32,
     first_pair: u32,
-    pairs: u32,
     first_rho: f32,
     step: f32,
     noise_var: f32,
@@ -165,7 +165,8 @@ pub(super) fn window_kernel(
     if x >= width {
         terminate!();
     }
-    let source = CUBE_POS_Z;
+    let source = CUBE_POS_Z % sources;
+    let pair = CUBE_POS_Z / sources;
     let top = CUBE_POS_Y * SEGMENT;
     let end = (top + SEGMENT).min(height);
     let across = width + 2 * radius;
@@ -194,124 +195,121 @@ pub(super) fn window_kernel(
     let mut column_s = Array::<Two>::new(columns);
     let mut column_r = Array::<f32>::new(comptime!(columns + 1));
     let rounds = (end - top + 2 * radius).div_ceil(2 * radius + 1);
-    for pair in 0..pairs {
-        let slice = pair * CUBE_COUNT_Z + source;
-        let from = slice * across * down + x;
-        let to = slice * width * height + x;
-        let plane = ((first_pair + pair) * 2) as f32;
-        let mut planes = Two::new(first_rho + step * plane);
-        planes.insert(1usize, first_rho + step * (plane + 1.0f32));
-        for round in 0..rounds {
+    let from = CUBE_POS_Z * across * down + x;
+    let to = CUBE_POS_Z * width * height + x;
+    let plane = ((first_pair + pair) * 2) as f32;
+    let mut planes = Two::new(first_rho + step * plane);
+    planes.insert(1usize, first_rho + step * (plane + 1.0f32));
+    for round in 0..rounds {
+        #[unroll]
+        for j in 0..side {
+            // The row of the framed picture that comes in below.
+            let below = top + round * (2 * radius + 1) + j as u32;
+            let row = below.min(down - 1) * across;
+            let line = (from + row) as usize;
+            let shade = (row + x) as usize;
             #[unroll]
-            for j in 0..side {
-                // The row of the framed picture that comes in below.
-                let below = top + round * (2 * radius + 1) + j as u32;
-                let row = below.min(down - 1) * across;
-                let line = (from + row) as usize;
-                let shade = (row + x) as usize;
+            for k in 0..comptime!(columns.div_ceil(2)) {
+                let two = gray[shade + comptime!(2 * k)];
+                column_r[comptime!(2 * k)] = low(two);
+                column_r[comptime!(2 * k + 1)] = high(two);
+            }
+            #[unroll]
+            for k in 0..columns {
+                column_s[k] = unpack(warped[line + k]);
+            }
+            // Sums over the columns that all windows of the thread have in common, then those that each has beside.
+            let mut s = Two::new(0.0f32);
+            let mut ss = Two::new(0.0f32);
+            let mut rs = Two::new(0.0f32);
+            let mut r = 0.0f32;
+            let mut rr = 0.0f32;
+            #[unroll]
+            for k in comptime!(wide - 1)..side {
+                let v = column_s[k];
+                let g = column_r[k];
+                s += v;
+                ss += v * v;
+                rs += v * Two::new(g);
+                r += g;
+                rr += g * g;
+            }
+            #[unroll]
+            for i in 0..wide {
+                let mut own_s = s;
+                let mut own_ss = ss;
+                let mut own_rs = rs;
+                let mut own_r = r;
+                let mut own_rr = rr;
                 #[unroll]
-                for k in 0..comptime!(columns.div_ceil(2)) {
-                    let two = gray[shade + comptime!(2 * k)];
-                    column_r[comptime!(2 * k)] = low(two);
-                    column_r[comptime!(2 * k + 1)] = high(two);
+                for k in 0..comptime!(wide - 1) {
+                    let beside = comptime!(if k + i + 1 < wide {
+                        i + k
+                    } else {
+                        side + k + i + 1 - wide
+                    });
+                    let v = column_s[beside];
+                    let g = column_r[beside];
+                    own_s += v;
+                    own_ss += v * v;
+                    own_rs += v * Two::new(g);
+                    own_r += g;
+                    own_rr += g * g;
                 }
-                #[unroll]
-                for k in 0..columns {
-                    column_s[k] = unpack(warped[line + k]);
-                }
-                // Sums over the columns that all windows of the thread have in common, then those that each has beside.
-                let mut s = Two::new(0.0f32);
-                let mut ss = Two::new(0.0f32);
-                let mut rs = Two::new(0.0f32);
-                let mut r = 0.0f32;
-                let mut rr = 0.0f32;
-                #[unroll]
-                for k in comptime!(wide - 1)..side {
-                    let v = column_s[k];
-                    let g = column_r[k];
-                    s += v;
-                    ss += v * v;
-                    rs += v * Two::new(g);
-                    r += g;
-                    rr += g * g;
-                }
+                let kept = comptime!(j * wide + i);
+                ring_s[kept] = own_s;
+                ring_ss[kept] = own_ss;
+                ring_rs[kept] = own_rs;
+                ring_r[kept] = own_r;
+                ring_rr[kept] = own_rr;
+            }
+            if below >= top + 2 * radius && below < end + 2 * radius {
+                let y = below - 2 * radius;
+                let yf = y as f32;
+                let rows = window(y, height, radius);
                 #[unroll]
                 for i in 0..wide {
-                    let mut own_s = s;
-                    let mut own_ss = ss;
-                    let mut own_rs = rs;
-                    let mut own_r = r;
-                    let mut own_rr = rr;
+                    let mut s = ring_s[i];
+                    let mut ss = ring_ss[i];
+                    let mut rs = ring_rs[i];
+                    let mut r = ring_r[i];
+                    let mut rr = ring_rr[i];
                     #[unroll]
-                    for k in 0..comptime!(wide - 1) {
-                        let beside = comptime!(if k + i + 1 < wide {
-                            i + k
-                        } else {
-                            side + k + i + 1 - wide
-                        });
-                        let v = column_s[beside];
-                        let g = column_r[beside];
-                        own_s += v;
-                        own_ss += v * v;
-                        own_rs += v * Two::new(g);
-                        own_r += g;
-                        own_rr += g * g;
+                    for k in 1..side {
+                        s += ring_s[comptime!(k * wide + i)];
+                        ss += ring_ss[comptime!(k * wide + i)];
+                        rs += ring_rs[comptime!(k * wide + i)];
+                        r += ring_r[comptime!(k * wide + i)];
+                        rr += ring_rr[comptime!(k * wide + i)];
                     }
-                    let kept = comptime!(j * wide + i);
-                    ring_s[kept] = own_s;
-                    ring_ss[kept] = own_ss;
-                    ring_rs[kept] = own_rs;
-                    ring_r[kept] = own_r;
-                    ring_rr[kept] = own_rr;
-                }
-                if below >= top + 2 * radius && below < end + 2 * radius {
-                    let y = below - 2 * radius;
-                    let yf = y as f32;
-                    let rows = window(y, height, radius);
-                    #[unroll]
-                    for i in 0..wide {
-                        let mut s = ring_s[i];
-                        let mut ss = ring_ss[i];
-                        let mut rs = ring_rs[i];
-                        let mut r = ring_r[i];
-                        let mut rr = ring_rr[i];
-                        #[unroll]
-                        for k in 1..side {
-                            s += ring_s[comptime!(k * wide + i)];
-                            ss += ring_ss[comptime!(k * wide + i)];
-                            rs += ring_rs[comptime!(k * wide + i)];
-                            r += ring_r[comptime!(k * wide + i)];
-                            rr += ring_rr[comptime!(k * wide + i)];
-                        }
-                        let own_x = x + comptime!(i as u32);
-                        let n = rows * window(own_x.min(width - 1), width, radius);
-                        let per = 1.0f32 / n;
-                        let covariance = rs - s * Two::new(r * per);
-                        let noise = noise_var * (n * (GRAY_STEPS * GRAY_STEPS));
-                        let var_r = (rr - r * r * per).max(0.0f32) + noise;
-                        let var_s = ss - s * s * Two::new(per);
-                        let var_s = max(var_s, Two::new(0.0f32)) + Two::new(noise);
-                        let score = covariance * (Two::new(var_r) * var_s).inverse_sqrt();
-                        let mut rho = planes;
-                        if comptime!(has_base) {
-                            let from = base[(y * width + own_x.min(width - 1)) as usize];
-                            rho = max(planes + Two::new(from), Two::new(1e-3f32));
-                        }
-                        let shift = comptime!(i as f32);
-                        let z = Two::new(z0 + zx * shift + zy * yf) + Two::new(bz) * rho;
-                        let u = Two::new(u0 + ux * shift + uy * yf) + Two::new(bu) * rho;
-                        let v = Two::new(v0 + vx * shift + vy * yf) + Two::new(bv) * rho;
-                        // 0 <= u / z <= most with z > 0, without the division.
-                        let room_x = min(u, Two::new(most_x) * z - u);
-                        let room_y = min(v, Two::new(most_y) * z - v);
-                        let room = min(min(room_x, room_y), z - Two::new(1e-6f32));
-                        let sees = room.greater_equal(&Two::new(0.0f32));
-                        let steps = score * Two::new(SCORE_STEPS);
-                        let out = select_many(sees, steps, Two::new(NONE));
-                        if own_x < width {
-                            scores[(to + y * width) as usize + i] =
-                                pack(out.extract(0usize), out.extract(1usize));
-                        }
+                    let own_x = x + comptime!(i as u32);
+                    let n = rows * window(own_x.min(width - 1), width, radius);
+                    let per = 1.0f32 / n;
+                    let covariance = rs - s * Two::new(r * per);
+                    let noise = noise_var * (n * (GRAY_STEPS * GRAY_STEPS));
+                    let var_r = (rr - r * r * per).max(0.0f32) + noise;
+                    let var_s = ss - s * s * Two::new(per);
+                    let var_s = max(var_s, Two::new(0.0f32)) + Two::new(noise);
+                    let score = covariance * (Two::new(var_r) * var_s).inverse_sqrt();
+                    let mut rho = planes;
+                    if comptime!(has_base) {
+                        let from = base[(y * width + own_x.min(width - 1)) as usize];
+                        rho = max(planes + Two::new(from), Two::new(1e-3f32));
+                    }
+                    let shift = comptime!(i as f32);
+                    let z = Two::new(z0 + zx * shift + zy * yf) + Two::new(bz) * rho;
+                    let u = Two::new(u0 + ux * shift + uy * yf) + Two::new(bu) * rho;
+                    let v = Two::new(v0 + vx * shift + vy * yf) + Two::new(bv) * rho;
+                    // 0 <= u / z <= most with z > 0, without the division.
+                    let room_x = min(u, Two::new(most_x) * z - u);
+                    let room_y = min(v, Two::new(most_y) * z - v);
+                    let room = min(min(room_x, room_y), z - Two::new(1e-6f32));
+                    let sees = room.greater_equal(&Two::new(0.0f32));
+                    let steps = score * Two::new(SCORE_STEPS);
+                    let out = select_many(sees, steps, Two::new(NONE));
+                    if own_x < width {
+                        scores[(to + y * width) as usize + i] =
+                            pack(out.extract(0usize), out.extract(1usize));
                     }
                 }
             }
