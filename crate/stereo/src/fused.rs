@@ -29,9 +29,9 @@ use burn::{
 use burn_cubecl::{CubeBackend, tensor::CubeTensor};
 use cubecl::prelude::*;
 use pictures::{Pictures, framed, upload};
-use shape::{PLANES_A_STEP, Shape, shape};
-use smooth::{DIRECTIONS, LANES, LINES};
-use sweep::{SEGMENT, STRIP, THREADS, TILE, WARP, WIDE};
+use shape::{Shape, shape};
+use smooth::DIRECTIONS;
+use sweep::{ROWS, SEGMENT, STRIP, THREADS, TILE, WARP, WIDE};
 
 /// Samples of a chunk of planes fill at most this much, as long as four planes do; scores as much again.
 const SCRATCH_BYTES: usize = 32 << 20;
@@ -153,7 +153,7 @@ impl FusedMatcher {
                     client,
                     CubeCount::Static(
                         (across as u32).div_ceil(TILE.0),
-                        (down as u32).div_ceil(TILE.1),
+                        (down as u32).div_ceil(TILE.1 * ROWS),
                         n,
                     ),
                     CubeDim::new_2d(TILE.0, TILE.1),
@@ -225,6 +225,7 @@ impl FusedMatcher {
     /// [`StereoError::Device`] if the device fails.
     pub fn smooth(&self, costs: &Costs, config: &SmoothConfig) -> Result<Sums, StereoError> {
         let shape = costs.shape;
+        let lanes = shape.lanes();
         let sum = self.empty_floats(shape.pixels() * shape.padded())?;
         for (i, (dx, dy)) in DIRECTIONS.into_iter().enumerate() {
             let lines = if dy == 0 { shape.height } else { shape.width };
@@ -232,8 +233,8 @@ impl FusedMatcher {
             unsafe {
                 smooth::path_kernel::launch_unchecked(
                     &sum.client,
-                    CubeCount::new_1d(lines.div_ceil(LINES) as u32),
-                    CubeDim::new_1d((LANES * LINES) as u32),
+                    CubeCount::new_1d((lines * lanes).div_ceil(smooth::THREADS) as u32),
+                    CubeDim::new_1d(smooth::THREADS as u32),
                     costs.cost.clone().into_buffer_arg(),
                     costs.gray.clone().into_buffer_arg(),
                     sum.clone().into_buffer_arg(),
@@ -245,7 +246,8 @@ impl FusedMatcher {
                     config.p1,
                     config.p2,
                     config.edge,
-                    shape.padded() / PLANES_A_STEP,
+                    lanes,
+                    shape.padded() / (4 * lanes),
                     shape.planes != shape.padded(),
                     i == 0,
                 );

@@ -1,18 +1,16 @@
 //! The sizes of a keyframe's work, and what fits on a device.
 
-use super::smooth::LANES;
+use super::smooth::{MOST_LANES, lanes};
 use crate::{StereoError, view::View};
 
 /// The largest binding that WebGPU guarantees.
 pub(super) const BINDING_BYTES: usize = 128 << 20;
 
-/// Planes come in groups that divide evenly among the threads of a line.
-pub(super) const PLANES_A_STEP: usize = 4 * LANES;
-
 /// The largest number of planes that a picture of this size can be swept with: their sums fill one binding.
 pub fn most_planes(width: usize, height: usize) -> usize {
     let pixels = (width * height).max(1);
-    BINDING_BYTES / (4 * pixels) / PLANES_A_STEP * PLANES_A_STEP
+    let step = 4 * MOST_LANES;
+    BINDING_BYTES / (4 * pixels) / step * step
 }
 
 /// The largest number of sources of this size that a picture of the same size can be compared with.
@@ -37,9 +35,14 @@ impl Shape {
         self.width * self.height
     }
 
-    /// Planes with those that only fill up.
+    /// Lanes of a line of the smoothing.
+    pub(super) fn lanes(&self) -> usize {
+        lanes(self.planes)
+    }
+
+    /// Planes with those that only fill up: groups of four divide evenly among the lanes.
     pub(super) fn padded(&self) -> usize {
-        self.planes.div_ceil(PLANES_A_STEP) * PLANES_A_STEP
+        self.planes.next_multiple_of(4 * self.lanes())
     }
 }
 

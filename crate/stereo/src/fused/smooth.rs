@@ -1,6 +1,6 @@
 //! Semi-global smoothing as one kernel a direction.
 //!
-//! A line of pixels is walked by [`LANES`] threads, each with its share of the planes in registers, so that only costs
+//! A line of pixels is walked by a few threads, its lanes, each with its share of the planes in registers, so that only costs
 //! and sums cross memory. After each step they exchange their outermost planes and their least value through workgroup
 //! memory: one barrier a pixel. Diagonal lines wrap around the picture's left and right border and start afresh there,
 //! so that all lines of a direction have the same length.
@@ -11,14 +11,20 @@ use super::{
 };
 use cubecl::prelude::*;
 
-/// Threads of a line.
-pub(super) const LANES: usize = 8;
+/// Threads of a workgroup.
+pub(super) const THREADS: usize = 32;
 
-/// Lines of a workgroup.
-pub(super) const LINES: usize = 8;
+/// The most lanes of a line.
+pub(super) const MOST_LANES: usize = 8;
 
-/// Numbers that a line keeps in workgroup memory: of each thread the first and last plane and the least value.
-const SHARED: usize = 3 * LANES;
+/// Lanes of a line: each has at least eight planes, so that the exchange costs little beside them.
+pub(super) fn lanes(planes: usize) -> usize {
+    match planes {
+        0..=32 => 2,
+        33..=64 => 4,
+        _ => MOST_LANES,
+    }
+}
 
 /// More than any cost along a path.
 const NEVER: f32 = 1e6;
@@ -35,7 +41,7 @@ pub(super) const DIRECTIONS: [(i32, i32); 8] = [
     (-1, -1),
 ];
 
-/// `cost` and `sum`: `[pixels, planes]`; `held` groups of four planes are a thread's. `ragged`: the last planes only fill up.
+/// `cost` and `sum`: `[pixels, planes]`; a line has `lanes` threads, and `held` groups of four planes are a thread's. `ragged`: the last planes only fill up.
 #[cube(launch_unchecked)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn path_kernel(
@@ -50,24 +56,27 @@ pub(super) fn path_kernel(
     p1: f32,
     p2: f32,
     edge: f32,
+    #[comptime] lanes: usize,
     #[comptime] held: usize,
     #[comptime] ragged: bool,
     #[comptime] first: bool,
 ) {
     let own = comptime!(held * 4);
-    let lane = UNIT_POS as usize % LANES;
-    let local = UNIT_POS as usize / LANES;
+    // Of each thread the first and last plane and the least value.
+    let kept = comptime!(3 * THREADS);
+    let lane = UNIT_POS as usize % lanes;
+    let local = UNIT_POS as usize / lanes;
     let mut lines = width;
     let mut steps = height;
     if dy == 0 {
         lines = height;
         steps = width;
     }
-    let line = CUBE_POS_X * comptime!(LINES as u32) + local as u32;
+    let line = CUBE_POS_X * comptime!((THREADS / lanes) as u32) + local as u32;
     // A thread without a line walks along the last one and writes nothing: barriers are for all.
     let active = line < lines;
     let line = line.min(lines - 1);
-    let mut shared = Shared::<[f32]>::new_slice(comptime!(2 * LINES * SHARED));
+    let mut shared = Shared::<[f32]>::new_slice(comptime!(2 * kept));
     let mut path = Array::<f32>::new(own);
     #[unroll]
     for j in 0..own {
@@ -102,7 +111,7 @@ pub(super) fn path_kernel(
         }
         shade = here;
         let far = least + penalty;
-        let from = (at * LANES + lane) * held;
+        let from = (at * lanes + lane) * held;
         let mut lowest = f32::new(NEVER);
         let mut before = below;
         #[unroll]
@@ -142,23 +151,23 @@ pub(super) fn path_kernel(
             }
         }
         // Two halves of the memory take turns, so that one barrier is enough.
-        let half = (step % 2) as usize * comptime!(LINES * SHARED);
-        let row = half + local * SHARED;
+        let half = (step % 2) as usize * kept;
+        let row = half + local * comptime!(3 * lanes);
         shared[row + lane] = path[0];
-        shared[row + LANES + lane] = path[comptime!(own - 1)];
-        shared[row + 2 * LANES + lane] = lowest;
+        shared[row + lanes + lane] = path[comptime!(own - 1)];
+        shared[row + comptime!(2 * lanes) + lane] = lowest;
         sync_cube();
-        least = shared[row + 2 * LANES];
+        least = shared[row + comptime!(2 * lanes)];
         #[unroll]
-        for k in 1..LANES {
-            least = min(least, shared[row + 2 * LANES + k]);
+        for k in 1..lanes {
+            least = min(least, shared[row + comptime!(2 * lanes) + k]);
         }
         below = f32::new(NEVER);
         above = f32::new(NEVER);
         if lane > 0 {
-            below = shared[row + LANES + lane - 1];
+            below = shared[row + lanes + lane - 1];
         }
-        if lane + 1 < LANES {
+        if lane + 1 < lanes {
             above = shared[row + lane + 1];
         }
         if dy != 0 {

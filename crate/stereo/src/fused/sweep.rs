@@ -20,6 +20,9 @@ pub(super) type Packed = Vector<i32, Const<2>>;
 /// Threads of a workgroup of the warp, along x and y.
 pub(super) const TILE: (u32, u32) = (16, 4);
 
+/// Rows that a thread of the warp does.
+pub(super) const ROWS: u32 = 4;
+
 /// Threads of a workgroup of the windows, along x.
 pub(super) const STRIP: u32 = 32;
 
@@ -39,7 +42,7 @@ pub(super) const WARP: usize = 16;
 /// The score of a source that does not see the point, in steps.
 const NONE: f32 = -32_000.0;
 
-/// A thread is a pixel of the framed reference and a source; it goes through the planes of the chunk.
+/// A thread is a source and some pixels of the framed reference below each other; it goes through the planes of the chunk.
 ///
 /// `warped`: `[pairs, sources, height + 2 radius, width + 2 radius]`.
 #[cube(launch_unchecked)]
@@ -62,27 +65,19 @@ pub(super) fn warp_kernel(
     let across = width + 2 * radius;
     let down = height + 2 * radius;
     let x = CUBE_POS_X * CUBE_DIM_X + UNIT_POS_X;
-    let y = CUBE_POS_Y * CUBE_DIM_Y + UNIT_POS_Y;
-    if x >= across || y >= down {
+    if x >= across {
         terminate!();
     }
     let source = CUBE_POS_Z;
-    let mut to = ((source * down + y) * across + x) as usize;
     let stride = (CUBE_COUNT_Z * down * across) as usize;
-
-    let inside = x >= radius && y >= radius && x < width + radius && y < height + radius;
-    let x = x - radius;
-    let y = y - radius;
-    let mut from = 0.0f32;
-    if comptime!(has_base) && inside {
-        from = base[(y * width + x) as usize];
-    }
-    let xf = x as f32;
-    let yf = y as f32;
     let w = source as usize * WARP;
-    let u0 = warps[w] * xf + (warps[w + 1] * yf + warps[w + 2]);
-    let v0 = warps[w + 3] * xf + (warps[w + 4] * yf + warps[w + 5]);
-    let z0 = warps[w + 6] * xf + (warps[w + 7] * yf + warps[w + 8]);
+    let xf = x as f32 - comptime!(radius as f32);
+    let ux = warps[w] * xf + warps[w + 2];
+    let vx = warps[w + 3] * xf + warps[w + 5];
+    let zx = warps[w + 6] * xf + warps[w + 8];
+    let uy = warps[w + 1];
+    let vy = warps[w + 4];
+    let zy = warps[w + 7];
     let bu = warps[w + 9];
     let bv = warps[w + 10];
     let bz = warps[w + 11];
@@ -90,35 +85,50 @@ pub(super) fn warp_kernel(
     let most_y = warps[w + 13];
     let pitch = warps[w + 14] as i32;
     let start = warps[w + 15] as i32 * slot as i32;
-    for pair in 0..pairs {
-        let mut out = 0i32;
-        if inside {
-            let plane = ((first_pair + pair) * 2) as f32;
-            let mut values = Two::new(0.0f32);
-            #[unroll]
-            for p in 0..2usize {
-                let mut rho = first_rho + step * (plane + comptime!(p as f32));
-                if comptime!(has_base) {
-                    rho = (rho + from).max(1e-3f32);
-                }
-                let inv = 1.0f32 / (z0 + bz * rho).max(1e-6f32);
-                let u = ((u0 + bu * rho) * inv).max(0.0f32).min(most_x);
-                let v = ((v0 + bv * rho) * inv).max(0.0f32).min(most_y);
-                let iu = u as i32;
-                let iv = v as i32;
-                let fu = u - iu as f32;
-                let fv = v - iv as f32;
-                let at = start + iv * pitch + iu;
-                let upper = pictures[at as usize];
-                let lower = pictures[(at + pitch) as usize];
-                let top = low(upper) + (high(upper) - low(upper)) * fu;
-                let bottom = low(lower) + (high(lower) - low(lower)) * fu;
-                values.insert(p, top + (bottom - top) * fv);
+    for row in 0..ROWS {
+        let y = (CUBE_POS_Y * ROWS + row) * CUBE_DIM_Y + UNIT_POS_Y;
+        if y < down {
+            let inside = x >= radius && y >= radius && x < width + radius && y < height + radius;
+            let mut from = 0.0f32;
+            if comptime!(has_base) && inside {
+                from = base[((y - radius) * width + x - radius) as usize];
             }
-            out = pack(values.extract(0usize), values.extract(1usize));
+            let yf = y as f32 - comptime!(radius as f32);
+            let u0 = ux + uy * yf;
+            let v0 = vx + vy * yf;
+            let z0 = zx + zy * yf;
+            let mut to = ((source * down + y) * across + x) as usize;
+            for pair in 0..pairs {
+                let mut out = 0i32;
+                if inside {
+                    let plane = ((first_pair + pair) * 2) as f32;
+                    let mut values = Two::new(0.0f32);
+                    #[unroll]
+                    for p in 0..2usize {
+                        let mut rho = first_rho + step * (plane + comptime!(p as f32));
+                        if comptime!(has_base) {
+                            rho = (rho + from).max(1e-3f32);
+                        }
+                        let inv = 1.0f32 / (z0 + bz * rho).max(1e-6f32);
+                        let u = ((u0 + bu * rho) * inv).max(0.0f32).min(most_x);
+                        let v = ((v0 + bv * rho) * inv).max(0.0f32).min(most_y);
+                        let iu = u as i32;
+                        let iv = v as i32;
+                        let fu = u - iu as f32;
+                        let fv = v - iv as f32;
+                        let at = start + iv * pitch + iu;
+                        let upper = pictures[at as usize];
+                        let lower = pictures[(at + pitch) as usize];
+                        let top = low(upper) + (high(upper) - low(upper)) * fu;
+                        let bottom = low(lower) + (high(lower) - low(lower)) * fu;
+                        values.insert(p, top + (bottom - top) * fv);
+                    }
+                    out = pack(values.extract(0usize), values.extract(1usize));
+                }
+                warped[to] = out;
+                to += stride;
+            }
         }
-        warped[to] = out;
-        to += stride;
     }
 }
 
