@@ -15,6 +15,8 @@ const COARSER: f32 = 1.25;
 const MARGIN: f64 = 0.8;
 /// Bytes a vertex of the drawn surface takes, and triangles a brick has on average: measured on furnished rooms.
 const TRIANGLES_PER_BRICK: usize = 75;
+/// The weight that a surface of stereo needs: half of what a sensor's needs. Measured in ARCHITECTURE.md.
+const STEREO_LEAST_WEIGHT: f32 = 0.02;
 /// Pictures that stereo keeps at its working size.
 const STEREO_PICTURES: usize = 48;
 
@@ -178,11 +180,14 @@ pub fn plan(scan: &Scan, limits: &Limits, options: Options) -> Result<Plan, Plan
 
 /// Which cells may have a surface. The one place where stereo's depth may be judged otherwise than a sensor's.
 fn surface_rule(depth: &DepthSource) -> SurfaceRule {
-    let usual = VolumeConfig::new(0.04).surface;
+    let sensor = VolumeConfig::new(0.04).surface;
     match depth {
-        DepthSource::Sensor => usual,
-        // The same least weight: a pixel of confidence 1/2 needs a second one to agree where a sure one stands alone.
-        DepthSource::Stereo(_) => usual,
+        DepthSource::Sensor => sensor,
+        // Two sources agreed to every depth of stereo already, and its weights are below 1.
+        DepthSource::Stereo(_) => SurfaceRule {
+            least_weight: STEREO_LEAST_WEIGHT,
+            ..sensor
+        },
     }
 }
 

@@ -75,7 +75,7 @@ pub async fn run(
     match &plan.depth {
         DepthSource::Sensor => sensor::fuse(scan, &plan.keyframes, &mut fusion, sink).await?,
         DepthSource::Stereo(config) => {
-            stereo::fuse(scan, &plan.keyframes, config, &mut fusion, sink).await?;
+            stereo::fuse(scan, &plan.keyframes, config, device, &mut fusion, sink).await?;
         }
     }
     if fusion.frames == 0 && !fusion.stopped {

@@ -1,55 +1,115 @@
-use crate::view::{View, warp};
+//! What may be relied on: a depth that the source views' own depth bears out (Merrell et al. 2007, as a vote).
+//!
+//! The point of a reference pixel is projected into a source; the depth found there is brought back. The source agrees if that
+//! lands within [`NEAR_PX`] of the pixel and within [`NEAR_RELATIVE`] of its depth.
+
+use crate::view::{View, Warp, warp};
 use rayon::prelude::*;
 
-/// number of sources that agree within rel and px, per pixel, and mean of the agreeing inverse depths (in the reference), itself included
-pub fn agree(
-    reference: &View,
-    rho: &[f32],
-    sources: &[(&View, &[f32])],
-    rel: f32,
-    px: f32,
-) -> (Vec<u8>, Vec<f32>) {
-    let w = reference.camera.width as usize;
-    let forth: Vec<_> = sources.iter().map(|(s, _)| warp(reference, s)).collect();
-    let back: Vec<_> = sources.iter().map(|(s, _)| warp(s, reference)).collect();
-    rho.par_iter()
-        .enumerate()
-        .map(|(p, &r)| {
-            let (x, y) = ((p % w) as f32, (p / w) as f32);
-            let (mut n, mut sum) = (0u8, r);
-            for (k, (s, other)) in sources.iter().enumerate() {
-                let (sw, sh) = (s.camera.width as usize, s.camera.height as usize);
-                let f = &forth[k];
-                let z = f.a[6] * x + f.a[7] * y + f.a[8] + f.b[2] * r;
-                if z <= 1e-6 {
-                    continue;
-                }
-                let u = (f.a[0] * x + f.a[1] * y + f.a[2] + f.b[0] * r) / z;
-                let v = (f.a[3] * x + f.a[4] * y + f.a[5] + f.b[1] * r) / z;
-                let (ui, vi) = ((u + 0.5).floor(), (v + 0.5).floor());
-                if !(ui >= 0.0 && vi >= 0.0 && ui < sw as f32 && vi < sh as f32) {
-                    continue;
-                }
-                let ro = other[vi as usize * sw + ui as usize];
-                if ro <= 0.0 {
-                    continue;
-                }
-                let b = &back[k];
-                let zb = b.a[6] * ui + b.a[7] * vi + b.a[8] + b.b[2] * ro;
-                if zb <= 1e-6 {
-                    continue;
-                }
-                let ub = (b.a[0] * ui + b.a[1] * vi + b.a[2] + b.b[0] * ro) / zb;
-                let vb = (b.a[3] * ui + b.a[4] * vi + b.a[5] + b.b[1] * ro) / zb;
-                // inverse depth in the reference: depth_ref = zb * depth_src
-                let rr = ro / zb;
-                let e = ((ub - x) * (ub - x) + (vb - y) * (vb - y)).sqrt();
-                if e <= px && (r / rr - 1.0).abs() <= rel {
-                    n += 1;
-                    sum += rr;
-                }
-            }
-            (n, sum / (f32::from(n) + 1.0))
+/// A point that comes back lands this near, in pixels,
+const NEAR_PX: f32 = 2.0;
+/// and its depth is this near, relative.
+const NEAR_RELATIVE: f32 = 0.05;
+/// Closely: half as far in pixels and this near in depth.
+const CLOSE_RELATIVE: f32 = 0.02;
+/// Uniqueness beyond this says no more.
+const MOST_UNIQUE: f32 = 0.3;
+
+/// What the sources say about one pixel's depth.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Verdict {
+    /// Sources in whose picture the point lies.
+    pub visible: u32,
+    /// Those that agree.
+    pub agree: u32,
+    /// Those that agree closely.
+    pub close: u32,
+}
+
+impl Verdict {
+    /// How likely the depth is right (within 5 cm or 3 %), 0 to 1, given how unique its plane was; 0 if no source agrees.
+    ///
+    /// A logistic function of three shares. Fitted to sensor depth on two scans with all and with 60 % of the
+    /// views, each alone gave almost the same coefficients.
+    pub fn confidence(&self, unique: f32) -> f32 {
+        if self.agree == 0 {
+            return 0.0;
+        }
+        let visible = self.visible as f32 + 1.0;
+        let (agree, close) = (self.agree as f32 / visible, self.close as f32 / visible);
+        let unique = unique.min(MOST_UNIQUE) / MOST_UNIQUE;
+        let score = -2.4 + 2.8 * agree + 3.1 * close + 1.5 * unique;
+        1.0 / (1.0 + (-score).exp())
+    }
+}
+
+/// A source as the judge needs it: there, back, and its own inverse depth.
+struct Witness<'a> {
+    to: Warp,
+    back: Warp,
+    rho: &'a [f32],
+    size: (usize, usize),
+}
+
+/// The verdict on each pixel of `reference`, whose inverse depth is `rho` (1/m, `[height * width]`), by the inverse depth of
+/// its sources.
+pub fn judge(reference: &View, rho: &[f32], sources: &[(&View, &[f32])]) -> Vec<Verdict> {
+    let width = reference.size().0;
+    let witness = |(source, rho): &(&View, &'_ [f32])| -> (Warp, Warp, (usize, usize), usize) {
+        (
+            warp(reference, source),
+            warp(source, reference),
+            source.size(),
+            rho.len(),
+        )
+    };
+    let known: Vec<_> = sources.iter().map(witness).collect();
+    let witnesses: Vec<Witness<'_>> = known
+        .into_iter()
+        .zip(sources)
+        .map(|((to, back, size, _), (_, rho))| Witness {
+            to,
+            back,
+            rho,
+            size,
         })
-        .unzip()
+        .collect();
+    let mut verdicts = vec![Verdict::default(); rho.len()];
+    let pixels = verdicts.par_iter_mut().zip(rho).enumerate();
+    pixels.for_each(|(at, (verdict, &rho))| {
+        let (x, y) = ((at % width) as f32, (at / width) as f32);
+        for witness in &witnesses {
+            witness.ask(x, y, rho, verdict);
+        }
+    });
+    verdicts
+}
+
+impl Witness<'_> {
+    fn ask(&self, x: f32, y: f32, rho: f32, verdict: &mut Verdict) {
+        let Some((u, v, _)) = self.to.apply(x, y, rho) else {
+            return;
+        };
+        let (u, v) = ((u + 0.5).floor(), (v + 0.5).floor());
+        let inside = u >= 0.0 && v >= 0.0 && u < self.size.0 as f32 && v < self.size.1 as f32;
+        if !inside {
+            return;
+        }
+        let found = self.rho[v as usize * self.size.0 + u as usize];
+        if found <= 0.0 {
+            return;
+        }
+        verdict.visible += 1;
+        let Some((x_back, y_back, rho_back)) = self.back.apply(u, v, found) else {
+            return;
+        };
+        let off_px = ((x_back - x) * (x_back - x) + (y_back - y) * (y_back - y)).sqrt();
+        let off = (rho / rho_back - 1.0).abs();
+        if off_px <= NEAR_PX && off <= NEAR_RELATIVE {
+            verdict.agree += 1;
+            if off_px <= 0.5 * NEAR_PX && off <= CLOSE_RELATIVE {
+                verdict.close += 1;
+            }
+        }
+    }
 }

@@ -1,48 +1,64 @@
+//! The winning plane of every pixel, between two planes where the costs beside it say so.
+
 use rayon::prelude::*;
 
+/// Planes this near to the winner do not count as another choice.
+const SAME: usize = 2;
+/// Paths that a smoothed cost is the sum of.
+const PATHS: f32 = 8.0;
+
+/// What matching gives, before anyone else is asked; `[height * width]` each.
+#[derive(Clone, Debug)]
 pub struct Raw {
+    /// Inverse depth in 1/m.
     pub rho: Vec<f32>,
+    /// Mean correlation with the counted sources at the winning plane, before smoothing.
     pub zncc: Vec<f32>,
+    /// How much worse the best plane elsewhere is, in cost a path.
     pub unique: Vec<f32>,
 }
 
-/// winner takes all with parabola; zncc is 1 - unsmoothed cost at the winner; unique: (second best sum - best)/8 outside +-2
+/// Winner takes all: the first least of `sum`, moved to the least of the parabola through it and its neighbours. `cost` and `sum`
+/// are `[height * width * offsets]`, planes innermost; `base` and `offsets` (1/m, evenly spaced) as in the sweep.
 pub fn winners(cost: &[f32], sum: &[f32], base: Option<&[f32]>, offsets: &[f32]) -> Raw {
-    let d = offsets.len();
-    let n = cost.len() / d;
-    let out: Vec<(f32, f32, f32)> = (0..n)
-        .into_par_iter()
-        .map(|p| {
-            let s = &sum[p * d..p * d + d];
-            let c = &cost[p * d..p * d + d];
-            let mut best = 0;
-            for i in 1..d {
-                if s[i] < s[best] {
-                    best = i;
-                }
+    let planes = offsets.len();
+    let pixels = cost.len() / planes.max(1);
+    let step = match offsets {
+        [first, second, ..] => second - first,
+        _ => 0.0,
+    };
+    let winner = |at: usize| {
+        let cells = at * planes..(at + 1) * planes;
+        let (cost, sum) = (&cost[cells.clone()], &sum[cells]);
+        let mut best = 0;
+        for plane in 1..planes {
+            if sum[plane] < sum[best] {
+                best = plane;
             }
-            let mut frac = 0.0;
-            if best > 0 && best < d - 1 {
-                let (a, b, e) = (s[best - 1], s[best], s[best + 1]);
-                let k = a - 2.0 * b + e;
-                if k > 1e-6 {
-                    frac = (0.5 * (a - e) / k).clamp(-0.5, 0.5);
-                }
-            }
-            let step = if d > 1 { offsets[1] - offsets[0] } else { 0.0 };
-            let rho = offsets[best] + frac * step + base.map_or(0.0, |b| b[p]);
-            let mut second = f32::MAX;
-            for i in 0..d {
-                if i.abs_diff(best) > 2 && s[i] < second {
-                    second = s[i];
-                }
-            }
-            (rho, 1.0 - c[best], (second - s[best]) / 8.0)
-        })
-        .collect();
-    Raw {
-        rho: out.iter().map(|o| o.0).collect(),
-        zncc: out.iter().map(|o| o.1).collect(),
-        unique: out.iter().map(|o| o.2).collect(),
+        }
+        let shift = match best {
+            0 => 0.0,
+            _ if best + 1 == planes => 0.0,
+            _ => vertex(sum[best - 1], sum[best], sum[best + 1]),
+        };
+        let others = sum
+            .iter()
+            .enumerate()
+            .filter(|(plane, _)| plane.abs_diff(best) > SAME);
+        let second = others.fold(f32::MAX, |least, (_, &sum)| least.min(sum));
+        let base = base.map_or(0.0, |base| base[at]);
+        let rho = base + offsets[best] + shift * step;
+        (rho, (1.0 - cost[best], (second - sum[best]) / PATHS))
+    };
+    let (rho, (zncc, unique)) = (0..pixels).into_par_iter().map(winner).unzip();
+    Raw { rho, zncc, unique }
+}
+
+/// Where between -0.5 and 0.5 the parabola through three values at -1, 0 and 1 is least.
+fn vertex(before: f32, at: f32, after: f32) -> f32 {
+    let bend = before - 2.0 * at + after;
+    if bend <= 1e-6 {
+        return 0.0;
     }
+    (0.5 * (before - after) / bend).clamp(-0.5, 0.5)
 }

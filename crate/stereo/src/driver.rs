@@ -1,14 +1,28 @@
 //! The way through a scan: keyframe by keyframe, with no more pictures in memory than the next steps need.
 
 use crate::{
-    StereoConfig, StereoError, consistency, depth, planes,
+    Recipe, StereoConfig, StereoError, consistency,
+    depth::{self, Raw},
+    fused::{FusedMatcher, most_planes},
+    planes, pose_check,
     smooth::{self, SmoothConfig},
     sources,
     sweep::{self, SweepConfig},
     view::{self, View},
 };
-use scan::{Camera, Finding, Scan};
-use std::{collections::HashMap, rc::Rc};
+use burn::tensor::Device;
+use scan::{Camera, Finding, Scan, Severity};
+use std::{
+    collections::{HashMap, HashSet},
+    rc::Rc,
+};
+
+/// Pictures kept at the working size.
+const VIEWS_KEPT: usize = 48;
+/// Below this correlation with its neighbours a frame is not where its pose says.
+const LEAST_CORRELATION: f32 = 0.25;
+/// Neighbours that must have depth before a frame's pose is judged.
+const LEAST_NEIGHBOURS: usize = 2;
 
 /// Depth of one keyframe, at the working size.
 #[derive(Clone, Debug)]
@@ -19,9 +33,9 @@ pub struct DepthMap {
     pub camera: Camera,
     /// What may be relied on: metres along the optical axis, row by row; 0 where nothing is known.
     pub depth_m: Vec<f32>,
-    /// How much each pixel of `depth_m` may be relied on, 0 to 1; 0 where nothing is known.
+    /// How likely each pixel of `depth_m` is right, 0 to 1; 0 where nothing is known.
     pub confidence: Vec<f32>,
-    /// Every pixel's best guess before it was compared with other views, in metres.
+    /// Every pixel's best guess before it was compared with other views' depth, in metres; 0 where there is none.
     pub raw_depth_m: Vec<f32>,
 }
 
@@ -30,7 +44,7 @@ pub struct DepthMap {
 pub enum Step {
     /// A part of a keyframe's work is done.
     Working,
-    /// A keyframe was matched with its sources; its depth comes once its neighbours are matched too.
+    /// A keyframe was matched with its sources; its depth comes once those are matched too.
     Matched,
     /// A keyframe's depth.
     Depth(DepthMap),
@@ -40,248 +54,345 @@ pub enum Step {
     Done,
 }
 
-/// Pictures kept at the working size.
-const VIEWS_KEPT: usize = 48;
-
 /// Stereo over a scan.
 pub struct Stereo {
-    pub config: StereoConfig,
-    pub tuning: Tuning,
+    /// The numbers it goes by; the defaults unless an experiment changes them.
+    pub recipe: Recipe,
+    config: StereoConfig,
+    /// The kernels, where the device runs them.
+    kernels: Option<FusedMatcher>,
     keyframes: Vec<usize>,
+    /// Of each keyframe, as indices into `keyframes`.
     sources: Vec<Vec<usize>>,
-    views: HashMap<usize, (Rc<View>, usize)>,
-    clock: usize,
-    raws: HashMap<usize, depth::Raw>,
+    views: Views,
+    /// A keyframe whose first sweep is done.
+    half: Option<(usize, Raw)>,
+    raws: HashMap<usize, Raw>,
+    /// Keyframes whose pose was judged.
+    judged: HashSet<usize>,
     next: usize,
 }
 
-/// Numbers under exploration.
-#[derive(Clone, Debug)]
-pub struct Tuning {
-    pub sweep: SweepConfig,
-    pub smooth: SmoothConfig,
-    pub min_zncc: f32,
-    pub rounds: usize,
-    pub fine: usize,
-    pub fine_step: f32,
-    pub planes: planes::PlanesConfig,
-    pub sweep2: SweepConfig,
-    pub smooth2: SmoothConfig,
-    pub need: usize,
-    pub rel: f32,
-    pub px: f32,
-}
-
 impl StereoConfig {
-    /// Chooses source views; nothing is decoded yet.
-    pub fn init(&self, scan: &Scan, keyframes: &[usize]) -> Result<Stereo, StereoError> {
+    /// Chooses the source views of every keyframe, which are indices into the scan's frames; nothing is decoded yet.
+    ///
+    /// # Errors
+    /// Settings that make no sense, no two keyframes that see the same from different places, or a failing device.
+    pub fn init(
+        &self,
+        scan: &Scan,
+        keyframes: &[usize],
+        device: &Device,
+    ) -> Result<Stereo, StereoError> {
         self.check()?;
-
-        let sources = sources::choose(scan.frames(), keyframes, self.sources, 0.25, 0.6);
+        let sources = sources::choose(scan.frames(), keyframes, self.sources);
         if sources.iter().all(Vec::is_empty) {
             return Err(StereoError::NoParallax {
                 keyframes: keyframes.len(),
-                least_m: 0.03,
+                least_m: sources::LEAST_BASELINE_M,
             });
         }
+        let kernels = match FusedMatcher::runs_on(device) {
+            true => Some(FusedMatcher::new(device)?),
+            false => None,
+        };
         Ok(Stereo {
+            recipe: Recipe::default(),
             config: *self,
-            tuning: Tuning {
-                sweep: SweepConfig {
-                    radius: 2,
-                    noise_var: 1.0,
-                    best: 0.5,
-                },
-                smooth: SmoothConfig {
-                    p1: 0.1,
-                    p2: 1.0,
-                    edge: 10.0,
-                },
-                rounds: 1,
-                fine: 8,
-                fine_step: 0.25,
-                planes: planes::PlanesConfig {
-                    radius: 8,
-                    stride: 2,
-                    gray: 10.0,
-                    rel: 0.03,
-                    rounds: 1,
-                    ridge: 1.0,
-                },
-                sweep2: SweepConfig {
-                    radius: 2,
-                    noise_var: 1.0,
-                    best: 0.5,
-                },
-                smooth2: SmoothConfig {
-                    p1: 0.05,
-                    p2: 0.3,
-                    edge: 10.0,
-                },
-                min_zncc: 0.1,
-                need: 2,
-                rel: 0.05,
-                px: 2.0,
-            },
+            kernels,
             keyframes: keyframes.to_vec(),
             sources,
-            views: HashMap::new(),
-            clock: 0,
+            views: Views::default(),
+            half: None,
             raws: HashMap::new(),
+            judged: HashSet::new(),
             next: 0,
         })
     }
 }
 
 impl Stereo {
-    /// Does the next step.
+    /// Does the next step: half a keyframe's matching, or the filtering of one whose sources are matched.
+    ///
+    /// # Errors
+    /// A failing device.
     pub async fn advance(&mut self, scan: &Scan) -> Result<Step, StereoError> {
-        if self.next == self.keyframes.len() {
-            return Ok(Step::Done);
+        if let Some((keyframe, coarse)) = self.half.take() {
+            return self.refine(scan, keyframe, coarse).await;
         }
-        let k = self.next;
-        let unmatched = std::iter::once(k)
-            .chain(self.sources[k].iter().copied())
-            .find(|j| !self.raws.contains_key(j));
-        if let Some(j) = unmatched {
-            return match self.match_keyframe(scan, j) {
-                Ok(()) => Ok(Step::Matched),
-                Err(finding) => {
-                    for s in &mut self.sources {
-                        s.retain(|&x| x != j);
-                    }
-                    self.keyframes.len();
-                    if j == k {
-                        self.next += 1;
-                    }
-                    Ok(Step::Finding(finding))
-                }
-            };
+        let Some(&frame) = self.keyframes.get(self.next) else {
+            return Ok(Step::Done);
+        };
+        let keyframe = self.next;
+        if self.sources[keyframe].is_empty() {
+            self.next += 1;
+            return Ok(Step::Depth(self.nothing(scan, frame)));
+        }
+        let around = std::iter::once(keyframe).chain(self.sources[keyframe].iter().copied());
+        let around: Vec<usize> = around.collect();
+        let has_depth = |k: &usize| self.raws.contains_key(k) || self.sources[*k].is_empty();
+        if let Some(&unmatched) = around.iter().find(|k| !has_depth(k)) {
+            return self.search(scan, unmatched).await;
+        }
+        for k in around {
+            if let Some(finding) = self.misplaced(scan, k) {
+                return Ok(Step::Finding(finding));
+            }
         }
         self.next += 1;
-        let map = self.filter(scan, k);
-        let still = |j: usize| {
-            j >= self.next
-                || (self.next..self.keyframes.len()).any(|m| self.sources[m].contains(&j))
-        };
-        let gone: Vec<usize> = self.raws.keys().copied().filter(|&j| !still(j)).collect();
-        for j in gone {
-            self.raws.remove(&j);
-        }
+        let map = self.filter(scan, keyframe);
+        self.forget();
         Ok(Step::Depth(map))
     }
 
-    fn view(&mut self, scan: &Scan, k: usize) -> Result<Rc<View>, Finding> {
+    /// The first sweep, over the whole range of depth.
+    async fn search(&mut self, scan: &Scan, keyframe: usize) -> Result<Step, StereoError> {
+        let (reference, sources) = match self.decode(scan, keyframe) {
+            Ok(views) => views,
+            Err(finding) => return Ok(Step::Finding(*finding)),
+        };
+        let offsets = self.planes(&reference);
+        let (sweep, smooth) = (self.recipe.sweep, self.recipe.smooth);
+        let raw = self
+            .matched(&reference, &sources, None, &offsets, (sweep, smooth))
+            .await?;
+        self.half = Some((keyframe, raw));
+        Ok(Step::Working)
+    }
+
+    /// The second sweep, around the local planes of the first.
+    async fn refine(
+        &mut self,
+        scan: &Scan,
+        keyframe: usize,
+        coarse: Raw,
+    ) -> Result<Step, StereoError> {
+        let (reference, sources) = match self.decode(scan, keyframe) {
+            Ok(views) => views,
+            Err(finding) => return Ok(Step::Finding(*finding)),
+        };
+        let weights = planes::weights(&coarse.zncc);
+        let (gray, size) = (&reference.gray, reference.size());
+        let base = planes::local_planes(&coarse.rho, &weights, gray, size, &self.recipe.planes);
+        let planes = self.planes(&reference);
+        let offsets = self.recipe.fine_offsets(planes[1] - planes[0]);
+        let (sweep, smooth) = (self.recipe.fine_sweep, self.recipe.fine_smooth);
+        let raw = self
+            .matched(&reference, &sources, Some(&base), &offsets, (sweep, smooth))
+            .await?;
+        self.raws.insert(keyframe, raw);
+        Ok(Step::Matched)
+    }
+
+    /// Inverse depth of the planes in 1/m, evenly spaced from the farthest to the nearest; on every device no more than a
+    /// buffer of a WebGPU device holds.
+    fn planes(&self, reference: &View) -> Vec<f32> {
+        let (width, height) = reference.size();
+        let count = self.config.planes.min(most_planes(width, height)).max(2);
+        let (far, near) = (1.0 / self.config.far_m, 1.0 / self.config.near_m);
+        let share = |i: usize| i as f32 / (count - 1) as f32;
+        (0..count).map(|i| far + (near - far) * share(i)).collect()
+    }
+
+    async fn matched(
+        &mut self,
+        reference: &View,
+        sources: &[(usize, Rc<View>)],
+        base: Option<&[f32]>,
+        offsets: &[f32],
+        (sweep_config, smooth_config): (SweepConfig, SmoothConfig),
+    ) -> Result<Raw, StereoError> {
+        if let Some(kernels) = &mut self.kernels {
+            let sources: Vec<(usize, &View)> = sources.iter().map(|(k, v)| (*k, &**v)).collect();
+            let (sweep, smooth) = (&sweep_config, &smooth_config);
+            return kernels
+                .match_view(reference, &sources, base, offsets, sweep, smooth)
+                .await;
+        }
+        let sources: Vec<&View> = sources.iter().map(|(_, view)| &**view).collect();
+        let cost = sweep::sweep(reference, &sources, base, offsets, &sweep_config);
+        let (size, planes) = (reference.size(), offsets.len());
+        let sum = smooth::smooth(&cost, &reference.gray, size, planes, &smooth_config);
+        Ok(depth::winners(&cost, &sum, base, offsets))
+    }
+
+    /// A keyframe's picture and those of its sources. One that cannot be decoded is left out from now on, and told.
+    #[allow(clippy::type_complexity)]
+    fn decode(
+        &mut self,
+        scan: &Scan,
+        keyframe: usize,
+    ) -> Result<(Rc<View>, Vec<(usize, Rc<View>)>), Box<Finding>> {
+        let mut views = Vec::new();
+        for k in std::iter::once(keyframe).chain(self.sources[keyframe].clone()) {
+            match self.views.get(scan, self.keyframes[k], self.config.size) {
+                Ok(view) => views.push((k, view)),
+                Err(finding) => {
+                    self.leave_out(k);
+                    return Err(finding);
+                }
+            }
+        }
+        let (_, reference) = views.remove(0);
+        Ok((reference, views))
+    }
+
+    /// A finding if the keyframe, which has depth or none, is not where its pose says; it is then left out.
+    fn misplaced(&mut self, scan: &Scan, keyframe: usize) -> Option<Finding> {
+        if self.judged.contains(&keyframe) {
+            return None;
+        }
+        let known = |k: &usize| self.raws.contains_key(k);
+        let neighbours: Vec<usize> = self.sources[keyframe]
+            .iter()
+            .copied()
+            .filter(known)
+            .collect();
+        if neighbours.len() < LEAST_NEIGHBOURS {
+            return None;
+        }
+        let frame = self.keyframes[keyframe];
+        let size = self.config.size;
+        let view = self.views.get(scan, frame, size).ok()?;
+        let pictures: Vec<Rc<View>> = neighbours
+            .iter()
+            .map(|&k| self.views.get(scan, self.keyframes[k], size).ok())
+            .collect::<Option<_>>()?;
+        let raws = neighbours.iter().map(|k| &self.raws[k]);
+        let asked: Vec<(&View, &Raw)> = pictures.iter().map(|v| &**v).zip(raws).collect();
+        let correlation = pose_check::correlation(&view, &asked)?;
+        self.judged.insert(keyframe);
+        if correlation >= LEAST_CORRELATION {
+            return None;
+        }
+        self.leave_out(keyframe);
+        let frame = &scan.frames()[frame];
+        Some(Finding {
+            severity: Severity::Warning,
+            code: "stereo-pose",
+            file: frame.color.as_ref().map(|color| color.path.clone()),
+            line: None,
+            expected: format!(
+                "a picture that looks like its {} neighbours' at its pose: a correlation of at least {LEAST_CORRELATION}",
+                neighbours.len()
+            ),
+            found: format!("{correlation:.2}"),
+            advice: "The frame is left out: its pose is wrong, or its picture belongs to another"
+                .to_owned(),
+            frames_affected: 1,
+        })
+    }
+
+    /// Nobody asks this keyframe any more, and it gives no depth.
+    fn leave_out(&mut self, keyframe: usize) {
+        self.sources[keyframe].clear();
+        for sources in &mut self.sources {
+            sources.retain(|&source| source != keyframe);
+        }
+        self.raws.remove(&keyframe);
+        self.half = None;
+    }
+
+    fn filter(&mut self, scan: &Scan, keyframe: usize) -> DepthMap {
+        let frame = self.keyframes[keyframe];
+        let size = self.config.size;
+        let sources = self.sources[keyframe].clone();
+        let witnesses: Vec<(usize, Rc<View>)> = sources
+            .into_iter()
+            .filter(|k| self.raws.contains_key(k))
+            .filter_map(|k| Some((k, self.views.get(scan, self.keyframes[k], size).ok()?)))
+            .collect();
+        let (Some(raw), Ok(view)) = (self.raws.get(&keyframe), self.views.get(scan, frame, size))
+        else {
+            return self.nothing(scan, frame);
+        };
+        let asked: Vec<(&View, &[f32])> = witnesses
+            .iter()
+            .map(|(k, view)| (&**view, self.raws[k].rho.as_slice()))
+            .collect();
+        let verdicts = consistency::judge(&view, &raw.rho, &asked);
+        let recipe = &self.recipe;
+        let confidence = verdicts.iter().zip(&raw.unique).map(|(verdict, &unique)| {
+            let least = match verdict.agree {
+                0 | 1 => recipe.least_confidence_alone,
+                _ => recipe.least_confidence,
+            };
+            let confidence = verdict.confidence(unique);
+            if confidence >= least { confidence } else { 0.0 }
+        });
+        let confidence: Vec<f32> = confidence.collect();
+        let kept = raw.rho.iter().zip(&confidence);
+        DepthMap {
+            frame,
+            camera: view.camera,
+            depth_m: kept
+                .map(|(rho, &c)| if c > 0.0 { 1.0 / rho } else { 0.0 })
+                .collect(),
+            confidence,
+            raw_depth_m: raw.rho.iter().map(|rho| 1.0 / rho).collect(),
+        }
+    }
+
+    /// The map of a frame about which nothing is known.
+    fn nothing(&self, scan: &Scan, frame: usize) -> DepthMap {
+        let camera = view::fit(&scan.frames()[frame].color_camera, self.config.size);
+        let unknown = vec![0.0; camera.width as usize * camera.height as usize];
+        DepthMap {
+            frame,
+            camera,
+            depth_m: unknown.clone(),
+            confidence: unknown.clone(),
+            raw_depth_m: unknown,
+        }
+    }
+
+    /// Drops the depth of keyframes that no later one asks for.
+    fn forget(&mut self) {
+        let to_come = self.next..self.sources.len();
+        let asked: HashSet<usize> = self.sources[to_come.clone()]
+            .iter()
+            .flatten()
+            .copied()
+            .collect();
+        self.raws
+            .retain(|k, _| to_come.contains(k) || asked.contains(k));
+    }
+}
+
+/// Pictures at the working size; those used longest ago give way.
+#[derive(Default)]
+struct Views {
+    kept: HashMap<usize, (Rc<View>, u64)>,
+    clock: u64,
+}
+
+impl Views {
+    fn get(
+        &mut self,
+        scan: &Scan,
+        frame: usize,
+        size: (u32, u32),
+    ) -> Result<Rc<View>, Box<Finding>> {
         self.clock += 1;
-        if let Some((view, used)) = self.views.get_mut(&k) {
+        if let Some((view, used)) = self.kept.get_mut(&frame) {
             *used = self.clock;
             return Ok(view.clone());
         }
-        let frame = &scan.frames()[self.keyframes[k]];
         let image = scan
-            .color(self.keyframes[k])
-            .map_err(|e| e.finding().clone())?;
-        let camera = view::fit(&frame.color_camera, self.config.size.0, self.config.size.1);
-        let view = Rc::new(View {
-            camera,
-            pose: frame.pose,
-            gray: view::gray(&image, camera.width, camera.height),
-        });
-        if self.views.len() >= VIEWS_KEPT
-            && let Some(&oldest) = self
-                .views
-                .iter()
-                .min_by_key(|(_, (_, used))| *used)
-                .map(|(k, _)| k)
+            .color(frame)
+            .map_err(|error| Box::new(error.finding().clone()))?;
+        let info = &scan.frames()[frame];
+        let view = Rc::new(View::new(
+            &image,
+            view::fit(&info.color_camera, size),
+            info.pose,
+        ));
+        if self.kept.len() >= VIEWS_KEPT
+            && let Some((&oldest, _)) = self.kept.iter().min_by_key(|(_, (_, used))| *used)
         {
-            self.views.remove(&oldest);
+            self.kept.remove(&oldest);
         }
-        self.views.insert(k, (view.clone(), self.clock));
+        self.kept.insert(frame, (view.clone(), self.clock));
         Ok(view)
-    }
-
-    fn match_keyframe(&mut self, scan: &Scan, k: usize) -> Result<(), Finding> {
-        let reference = self.view(scan, k)?;
-        let mut sources = Vec::new();
-        for s in self.sources[k].clone() {
-            if let Ok(v) = self.view(scan, s) {
-                sources.push(v);
-            }
-        }
-        let s: Vec<&View> = sources.iter().map(|v| &**v).collect();
-        let (near, far, n) = (
-            1.0 / self.config.near_m,
-            1.0 / self.config.far_m,
-            self.config.planes,
-        );
-        let offsets: Vec<f32> = (0..n)
-            .map(|i| far + (near - far) * i as f32 / (n - 1) as f32)
-            .collect();
-        let (w, h) = (
-            reference.camera.width as usize,
-            reference.camera.height as usize,
-        );
-        let cost = sweep::sweep(&reference, &s, None, &offsets, &self.tuning.sweep);
-        let sum = smooth::smooth(&cost, &reference.gray, w, h, n, &self.tuning.smooth);
-        let mut raw = depth::winners(&cost, &sum, None, &offsets);
-        let t = &self.tuning;
-        let step = (near - far) / (n - 1) as f32;
-        for _ in 0..t.rounds {
-            let weight: Vec<f32> = raw
-                .zncc
-                .iter()
-                .map(|z| (z - 0.05).clamp(0.01, 1.0))
-                .collect();
-            let base = planes::local_planes(&raw.rho, &weight, &reference.gray, w, h, &t.planes);
-            if t.fine == 0 {
-                raw.rho = base;
-                continue;
-            }
-            let half = t.fine as i32;
-            let offsets: Vec<f32> = (-half..=half)
-                .map(|i| i as f32 * step * t.fine_step)
-                .collect();
-            let cost = sweep::sweep(&reference, &s, Some(&base), &offsets, &t.sweep2);
-            let sum = smooth::smooth(&cost, &reference.gray, w, h, offsets.len(), &t.smooth2);
-            raw = depth::winners(&cost, &sum, Some(&base), &offsets);
-        }
-        self.raws.insert(k, raw);
-        Ok(())
-    }
-
-    fn filter(&mut self, scan: &Scan, k: usize) -> DepthMap {
-        let t = self.tuning.clone();
-        let reference = self.view(scan, k).ok();
-        let list = self.sources[k].clone();
-        let views: Vec<Rc<View>> = list
-            .iter()
-            .filter_map(|&j| self.view(scan, j).ok())
-            .collect();
-        let Some(reference) = reference else {
-            unreachable!()
-        };
-        let raw = &self.raws[&k];
-        let s: Vec<(&View, &[f32])> = list
-            .iter()
-            .zip(&views)
-            .map(|(j, v)| (&**v, self.raws[j].rho.as_slice()))
-            .collect();
-        let (count, _) = consistency::agree(&reference, &raw.rho, &s, t.rel, t.px);
-        let need = t.need.min(s.len()).max(1);
-        let keep: Vec<bool> = (0..count.len())
-            .map(|p| count[p] as usize >= need && raw.zncc[p] >= t.min_zncc)
-            .collect();
-        DepthMap {
-            frame: self.keyframes[k],
-            camera: reference.camera,
-            depth_m: raw
-                .rho
-                .iter()
-                .zip(&keep)
-                .map(|(r, k)| if *k { 1.0 / r } else { 0.0 })
-                .collect(),
-            confidence: keep.iter().map(|&k| if k { 1.0 } else { 0.0 }).collect(),
-            raw_depth_m: raw.rho.iter().map(|r| 1.0 / r).collect(),
-        }
     }
 }

@@ -1,84 +1,117 @@
-//! Local planes in inverse depth.
+//! Local planes: what a keyframe's depth looks like when every pixel lies on the plane through its neighbours.
+//!
+//! A plane in space is affine in inverse depth, so around each pixel `rho(dx, dy) = c + a dx + b dy` is fitted by weighted
+//! least squares to the trusted neighbours of similar grey and similar inverse depth; Cauchy weights let edges be edges.
+
 use rayon::prelude::*;
 
-#[derive(Clone, Debug)]
+/// Neighbours of the worst match still count this much.
+const LEAST_WEIGHT: f32 = 0.01;
+/// A correlation up to here says nothing.
+const NO_MATCH: f32 = 0.05;
+/// Weight of a pixel's own inverse depth where nothing else is trusted.
+const OWN: f32 = 1e-6;
+
+/// How planes are fitted.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanesConfig {
+    /// Neighbours up to this many pixels away, across and down.
     pub radius: i32,
+    /// Every n-th of them.
     pub stride: i32,
+    /// Difference in grey at which a neighbour counts half.
     pub gray: f32,
-    pub rel: f32,
-    pub rounds: usize,
+    /// Relative difference in inverse depth at which a neighbour counts half.
+    pub relative: f32,
+    /// Pull of the slopes towards zero, in squared pixels: a few neighbours in a row do not tilt the plane.
     pub ridge: f32,
 }
 
-/// Weighted least-squares plane of inverse depth around each pixel (a plane in space is affine in inverse depth), evaluated there.
+/// How much each pixel is trusted, from its correlation.
+pub fn weights(zncc: &[f32]) -> Vec<f32> {
+    let weight = |z: &f32| (z - NO_MATCH).clamp(LEAST_WEIGHT, 1.0);
+    zncc.iter().map(weight).collect()
+}
+
+/// The inverse depth of each pixel's local plane at the pixel, in 1/m. `rho`, `weight` and `gray` have `[height * width]` values.
 pub fn local_planes(
     rho: &[f32],
     weight: &[f32],
     gray: &[f32],
-    w: usize,
-    h: usize,
-    c: &PlanesConfig,
+    (width, height): (usize, usize),
+    config: &PlanesConfig,
 ) -> Vec<f32> {
-    let mut now = rho.to_vec();
-    for _ in 0..c.rounds {
-        let prev = &now;
-        let next: Vec<f32> = (0..w * h)
-            .into_par_iter()
-            .map(|p| {
-                let (x, y) = ((p % w) as i32, (p / w) as i32);
-                let (g0, r0) = (gray[p], prev[p]);
-                let (mut s, mut sx, mut sy, mut sxx, mut sxy, mut syy, mut sr, mut sxr, mut syr) =
-                    (1e-6f32, 0.0, 0.0, 0.0, 0.0, 0.0, 1e-6 * r0, 0.0, 0.0);
-                let mut dy = -c.radius;
-                while dy <= c.radius {
-                    let yy = y + dy;
-                    if yy >= 0 && yy < h as i32 {
-                        let mut dx = -c.radius;
-                        while dx <= c.radius {
-                            let xx = x + dx;
-                            if xx >= 0 && xx < w as i32 {
-                                let q = yy as usize * w + xx as usize;
-                                let dg = (gray[q] - g0) / c.gray;
-                                let dr = (prev[q] - r0) / (c.rel * r0);
-                                let k = weight[q] / (1.0 + dg * dg) / (1.0 + dr * dr);
-                                let (fx, fy) = (dx as f32, dy as f32);
-                                s += k;
-                                sx += k * fx;
-                                sy += k * fy;
-                                sxx += k * fx * fx;
-                                sxy += k * fx * fy;
-                                syy += k * fy * fy;
-                                let d = rho[q] - r0;
-                                sr += k * d;
-                                sxr += k * d * fx;
-                                syr += k * d * fy;
-                            }
-                            dx += c.stride;
-                        }
-                    }
-                    dy += c.stride;
-                }
-                sr -= 1e-6 * r0;
-                // ridge on the slopes
-                let ridge = c.ridge * s;
-                let (mx, my, mr) = (sx / s, sy / s, sr / s);
-                let (cxx, cxy, cyy) = (
-                    sxx - s * mx * mx + ridge,
-                    sxy - s * mx * my,
-                    syy - s * my * my + ridge,
-                );
-                let (cxr, cyr) = (sxr - s * mx * mr, syr - s * my * mr);
-                let det = cxx * cyy - cxy * cxy;
-                let (a, b) = if det > 1e-9 {
-                    ((cxr * cyy - cyr * cxy) / det, (cyr * cxx - cxr * cxy) / det)
-                } else {
-                    (0.0, 0.0)
-                };
-                (r0 + mr - a * mx - b * my).max(1e-3)
-            })
-            .collect();
-        now = next;
+    let fit = |at: usize| {
+        let (x, y) = ((at % width) as i32, (at / width) as i32);
+        let (own_gray, own_rho) = (gray[at], rho[at]);
+        let steps = |centre: i32, size: usize| {
+            let inside = move |d: &i32| (0..size as i32).contains(&(centre + d));
+            let steps = (-config.radius..=config.radius).step_by(config.stride as usize);
+            steps.filter(inside)
+        };
+        let mut sums = Sums::default();
+        for dy in steps(y, height) {
+            for dx in steps(x, width) {
+                let there = (y + dy) as usize * width + (x + dx) as usize;
+                let off = rho[there] - own_rho;
+                let by_gray = (gray[there] - own_gray) / config.gray;
+                let by_rho = off / (config.relative * own_rho);
+                let similar = (1.0 + by_gray * by_gray) * (1.0 + by_rho * by_rho);
+                sums.add(weight[there] / similar, dx as f32, dy as f32, off);
+            }
+        }
+        (own_rho + sums.at_centre(config.ridge)).max(crate::sweep::LEAST_RHO)
+    };
+    let mut planes = vec![0.0; rho.len()];
+    planes
+        .par_iter_mut()
+        .enumerate()
+        .for_each(|(at, plane)| *plane = fit(at));
+    planes
+}
+
+/// Weighted sums of positions and offsets.
+#[derive(Default)]
+struct Sums {
+    one: f32,
+    x: f32,
+    y: f32,
+    xx: f32,
+    xy: f32,
+    yy: f32,
+    v: f32,
+    xv: f32,
+    yv: f32,
+}
+
+impl Sums {
+    fn add(&mut self, weight: f32, x: f32, y: f32, value: f32) {
+        let (wx, wy, wv) = (weight * x, weight * y, weight * value);
+        self.one += weight;
+        self.x += wx;
+        self.y += wy;
+        self.xx += wx * x;
+        self.xy += wx * y;
+        self.yy += wy * y;
+        self.v += wv;
+        self.xv += wv * x;
+        self.yv += wv * y;
     }
-    now
+
+    /// The fitted plane's value at (0, 0).
+    fn at_centre(&self, ridge: f32) -> f32 {
+        let one = self.one + OWN;
+        let (x, y, v) = (self.x / one, self.y / one, self.v / one);
+        let xx = self.xx - one * x * x + ridge * one;
+        let yy = self.yy - one * y * y + ridge * one;
+        let xy = self.xy - one * x * y;
+        let (xv, yv) = (self.xv - one * x * v, self.yv - one * y * v);
+        let determinant = xx * yy - xy * xy;
+        if determinant <= 1e-9 {
+            return v;
+        }
+        let a = (xv * yy - yv * xy) / determinant;
+        let b = (yv * xx - xv * xy) / determinant;
+        v - a * x - b * y
+    }
 }

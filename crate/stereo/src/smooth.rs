@@ -1,107 +1,231 @@
+//! Semi-global smoothing (Hirschmueller 2008): the costs of a pixel's planes plus those of its neighbours along eight straight
+//! paths, where a change of plane costs something, less across an edge of the picture.
+//!
+//! Along a path that comes from pixel `q` to `p`:
+//! `L(p, d) = C(p, d) + min(L(q, d), L(q, d ± 1) + P1, min L(q) + P2') - min L(q)`, with
+//! `P2' = max(P1, P2 / (1 + |I(p) - I(q)| / edge))`; a path starts with its cost. The result is the sum over the eight.
+
+use pulp::Arch;
 use rayon::prelude::*;
 
-#[derive(Clone, Debug)]
+/// What a change of plane costs.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SmoothConfig {
+    /// To the next plane.
     pub p1: f32,
+    /// To any other, where the picture has no edge.
     pub p2: f32,
+    /// Difference in grey, of 256 levels, at which that is halved.
     pub edge: f32,
 }
 
-/// sum over eight paths
+/// Pixels of a row that one thread takes at a time.
+const PIXELS_A_TASK: usize = 32;
+
+/// The paths of one pass come from the row before, from these columns.
+const FROM: [i32; 3] = [-1, 0, 1];
+
+/// The sums, laid out as `cost`: `[height * width * planes]`, planes innermost. `gray` has `[height * width]` values.
 pub fn smooth(
     cost: &[f32],
     gray: &[f32],
-    w: usize,
-    h: usize,
-    d: usize,
-    c: &SmoothConfig,
+    (width, height): (usize, usize),
+    planes: usize,
+    config: &SmoothConfig,
 ) -> Vec<f32> {
+    let job = Job {
+        cost,
+        gray,
+        width,
+        height,
+        planes,
+        config,
+    };
     let mut sum = vec![0.0f32; cost.len()];
-    let p2 = |a: usize, b: usize| (c.p2 / (1.0 + (gray[a] - gray[b]).abs() / c.edge)).max(c.p1);
-    sum.par_chunks_mut(w * d).enumerate().for_each(|(y, out)| {
-        let (mut l, mut m) = (vec![0.0f32; d], vec![0.0f32; d]);
-        for back in [false, true] {
-            let mut least = 0.0;
-            for i in 0..w {
-                let x = if back { w - 1 - i } else { i };
-                let at = y * w + x;
-                let cst = &cost[at * d..at * d + d];
-                if i == 0 {
-                    m.copy_from_slice(cst);
-                    least = m.iter().copied().fold(f32::MAX, f32::min);
-                } else {
-                    let prev = if back { at + 1 } else { at - 1 };
-                    least = step(cst, &l, least, c.p1, p2(at, prev), &mut m);
-                }
-                for (o, v) in out[x * d..x * d + d].iter_mut().zip(&m) {
-                    *o += v;
-                }
-                std::mem::swap(&mut l, &mut m);
-            }
-        }
+    let rows = sum.par_chunks_mut(width * planes).enumerate();
+    rows.for_each(|(y, sum)| {
+        Arch::new().dispatch(
+            #[inline(always)]
+            || job.along_row(y, sum),
+        );
     });
-    for up in [false, true] {
-        let mut prev = vec![0.0f32; 3 * w * d];
-        let mut prev_min = vec![0.0f32; 3 * w];
-        let mut cur = vec![0.0f32; 3 * w * d];
-        let mut cur_min = vec![0.0f32; 3 * w];
-        for i in 0..h {
-            let y = if up { h - 1 - i } else { i };
-            let py = if up { y + 1 } else { y.wrapping_sub(1) };
-            cur.par_chunks_mut(3 * d)
-                .zip(cur_min.par_chunks_mut(3))
-                .zip(sum[y * w * d..(y + 1) * w * d].par_chunks_mut(d))
-                .with_min_len(32)
-                .enumerate()
-                .for_each(|(x, ((cur, cur_min), out))| {
-                    let at = y * w + x;
-                    let cst = &cost[at * d..at * d + d];
-                    for (k, dx) in [-1i32, 0, 1].into_iter().enumerate() {
-                        let px = x as i32 + dx;
-                        let m = &mut cur[k * d..k * d + d];
-                        if i == 0 || px < 0 || px >= w as i32 {
-                            m.copy_from_slice(cst);
-                            cur_min[k] = m.iter().copied().fold(f32::MAX, f32::min);
-                        } else {
-                            let px = px as usize;
-                            let l = &prev[(px * 3 + k) * d..(px * 3 + k) * d + d];
-                            cur_min[k] =
-                                step(cst, l, prev_min[px * 3 + k], c.p1, p2(at, py * w + px), m);
-                        }
-                        for (o, v) in out.iter_mut().zip(&*m) {
-                            *o += v;
-                        }
-                    }
-                });
-            std::mem::swap(&mut prev, &mut cur);
-            std::mem::swap(&mut prev_min, &mut cur_min);
-        }
-    }
+    job.across_rows(&mut sum, false);
+    job.across_rows(&mut sum, true);
     sum
 }
 
-#[inline(always)]
-fn step(cost: &[f32], l: &[f32], least: f32, p1: f32, p2: f32, out: &mut [f32]) -> f32 {
-    let d = cost.len();
-    let far = least + p2;
-    let (cost, l, out) = (&cost[..d], &l[..d], &mut out[..d]);
-    for i in 1..d - 1 {
-        let v = l[i].min(far).min((l[i - 1].min(l[i + 1])) + p1);
-        out[i] = cost[i] + v - least;
+struct Job<'a> {
+    cost: &'a [f32],
+    gray: &'a [f32],
+    width: usize,
+    height: usize,
+    planes: usize,
+    config: &'a SmoothConfig,
+}
+
+impl Job<'_> {
+    fn cost(&self, at: usize) -> &[f32] {
+        &self.cost[at * self.planes..(at + 1) * self.planes]
     }
-    out[0] = cost[0] + l[0].min(far).min(l[1] + p1) - least;
-    out[d - 1] = cost[d - 1] + l[d - 1].min(far).min(l[d - 2] + p1) - least;
-    let mut m = [f32::MAX; 8];
-    let ch = out.chunks_exact(8);
-    let rest = ch.remainder();
-    for c in ch {
-        for k in 0..8 {
-            m[k] = if c[k] < m[k] { c[k] } else { m[k] };
+
+    fn far_penalty(&self, at: usize, from: usize) -> f32 {
+        let SmoothConfig { p1, p2, edge } = *self.config;
+        (p2 / (1.0 + (self.gray[at] - self.gray[from]).abs() / edge)).max(p1)
+    }
+
+    /// The two paths along a row.
+    #[inline(always)]
+    fn along_row(&self, y: usize, sum: &mut [f32]) {
+        let mut before = vec![0.0f32; self.planes];
+        let mut path = vec![0.0f32; self.planes];
+        for backwards in [false, true] {
+            let mut least = 0.0;
+            for i in 0..self.width {
+                let x = if backwards { self.width - 1 - i } else { i };
+                let at = y * self.width + x;
+                least = if i == 0 {
+                    start(self.cost(at), &mut path)
+                } else {
+                    let from = if backwards { at + 1 } else { at - 1 };
+                    let far = self.far_penalty(at, from);
+                    step(
+                        self.cost(at),
+                        &before,
+                        least,
+                        self.config.p1,
+                        far,
+                        &mut path,
+                    )
+                };
+                add(&mut sum[x * self.planes..(x + 1) * self.planes], &path);
+                std::mem::swap(&mut before, &mut path);
+            }
         }
     }
-    let mut r = m.iter().copied().fold(f32::MAX, f32::min);
-    for &v in rest {
-        r = r.min(v);
+
+    /// The three paths that come from the row above, or below. A row needs the one before whole; its pixels go side by side.
+    fn across_rows(&self, sum: &mut [f32], upwards: bool) {
+        let (width, planes) = (self.width, self.planes);
+        let paths = FROM.len() * planes;
+        let (mut before, mut path) = (vec![0.0f32; width * paths], vec![0.0f32; width * paths]);
+        let (mut least_before, mut least) = ([0.0f32; 3].repeat(width), [0.0f32; 3].repeat(width));
+        for i in 0..self.height {
+            let y = if upwards { self.height - 1 - i } else { i };
+            let row = &mut sum[y * width * planes..(y + 1) * width * planes];
+            let pixels = path.par_chunks_mut(PIXELS_A_TASK * paths);
+            let pixels = pixels.zip(least.par_chunks_mut(PIXELS_A_TASK * FROM.len()));
+            let pixels = pixels
+                .zip(row.par_chunks_mut(PIXELS_A_TASK * planes))
+                .enumerate();
+            pixels.for_each(|(task, ((path, least), sum))| {
+                Arch::new().dispatch(
+                    #[inline(always)]
+                    || {
+                        let pixels = path
+                            .chunks_exact_mut(paths)
+                            .zip(least.chunks_exact_mut(FROM.len()));
+                        for (k, ((path, least), sum)) in
+                            pixels.zip(sum.chunks_exact_mut(planes)).enumerate()
+                        {
+                            let x = task * PIXELS_A_TASK + k;
+                            let from_row = (i > 0).then(|| if upwards { y + 1 } else { y - 1 });
+                            self.come_from_row(x, y, from_row, &before, &least_before, path, least);
+                            for path in path.chunks_exact(planes) {
+                                add(sum, path);
+                            }
+                        }
+                    },
+                );
+            });
+            std::mem::swap(&mut before, &mut path);
+            std::mem::swap(&mut least_before, &mut least);
+        }
     }
-    r
+
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    fn come_from_row(
+        &self,
+        x: usize,
+        y: usize,
+        from_row: Option<usize>,
+        before: &[f32],
+        least_before: &[f32],
+        path: &mut [f32],
+        least: &mut [f32],
+    ) {
+        let at = y * self.width + x;
+        for ((direction, dx), path) in FROM
+            .into_iter()
+            .enumerate()
+            .zip(path.chunks_exact_mut(self.planes))
+        {
+            let from_x = x
+                .checked_add_signed(dx as isize)
+                .filter(|&x| x < self.width);
+            least[direction] = match (from_row, from_x) {
+                (Some(from_row), Some(from_x)) => {
+                    let index = from_x * FROM.len() + direction;
+                    let before = &before[index * self.planes..(index + 1) * self.planes];
+                    let far = self.far_penalty(at, from_row * self.width + from_x);
+                    step(
+                        self.cost(at),
+                        before,
+                        least_before[index],
+                        self.config.p1,
+                        far,
+                        path,
+                    )
+                }
+                _ => start(self.cost(at), path),
+            };
+        }
+    }
+}
+
+/// A path's first values are the costs. Gives their least.
+#[inline(always)]
+fn start(cost: &[f32], path: &mut [f32]) -> f32 {
+    path.copy_from_slice(cost);
+    least_of(path)
+}
+
+/// One step along a path: from the values `before`, whose least is `least`, to `path`. Gives its least.
+#[inline(always)]
+fn step(cost: &[f32], before: &[f32], least: f32, p1: f32, p2: f32, path: &mut [f32]) -> f32 {
+    let planes = cost.len();
+    let far = least + p2;
+    let (before, path) = (&before[..planes], &mut path[..planes]);
+    for d in 1..planes - 1 {
+        let near = before[d - 1].min(before[d + 1]) + p1;
+        path[d] = cost[d] + before[d].min(far).min(near) - least;
+    }
+    let last = planes - 1;
+    path[0] = cost[0] + before[0].min(far).min(before[1] + p1) - least;
+    path[last] = cost[last] + before[last].min(far).min(before[last - 1] + p1) - least;
+    least_of(path)
+}
+
+#[inline(always)]
+fn add(sum: &mut [f32], path: &[f32]) {
+    for (sum, path) in sum.iter_mut().zip(path) {
+        *sum += path;
+    }
+}
+
+/// In eight strands, so that it is done in vectors.
+#[inline(always)]
+fn least_of(values: &[f32]) -> f32 {
+    let mut strands = [f32::MAX; 8];
+    let eights = values.chunks_exact(8);
+    let rest = eights.remainder();
+    for eight in eights {
+        for (least, value) in strands.iter_mut().zip(eight) {
+            *least = if value < least { *value } else { *least };
+        }
+    }
+    strands
+        .iter()
+        .chain(rest)
+        .fold(f32::MAX, |least, &value| least.min(value))
 }

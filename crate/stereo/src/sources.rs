@@ -1,62 +1,74 @@
-use glam::DVec3;
-use scan::Frame;
+//! Which other keyframes a keyframe is compared with: those that see the same from a little aside.
 
-/// up to n sources of each keyframe, best first
-pub fn choose(
-    frames: &[Frame],
-    keys: &[usize],
-    n: usize,
-    baseline: f64,
-    sigma: f64,
-) -> Vec<Vec<usize>> {
-    (0..keys.len())
-        .map(|i| {
-            let r = &frames[keys[i]];
-            let mut scored: Vec<(f64, usize)> = (0..keys.len())
-                .filter(|&j| j != i)
-                .filter_map(|j| {
-                    let s = &frames[keys[j]];
-                    let b = (r.pose.translation - s.pose.translation).length();
-                    if b < 0.03 {
-                        return None;
-                    }
-                    // overlap: share of a grid of points at some depths that fall in the source
-                    let c = &r.color_camera;
-                    let m = s.pose.inverse() * r.pose;
-                    let (mut seen, mut all) = (0.0, 0.0);
-                    for z in [1.5, 3.0] {
-                        for gy in 0..5 {
-                            for gx in 0..5 {
-                                let px = glam::DVec2::new(
-                                    (gx as f64 + 0.5) / 5.0 * c.width as f64,
-                                    (gy as f64 + 0.5) / 5.0 * c.height as f64,
-                                );
-                                let p: DVec3 = m.transform_point3(c.unproject(px, z));
-                                all += 1.0;
-                                if let Some(q) = s.color_camera.project(p) {
-                                    if q.x >= 0.0
-                                        && q.y >= 0.0
-                                        && q.x < s.color_camera.width as f64
-                                        && q.y < s.color_camera.height as f64
-                                    {
-                                        seen += 1.0;
-                                    }
-                                }
-                            }
-                        }
-                    }
-                    let overlap: f64 = seen / all;
-                    if overlap < 0.25 {
-                        return None;
-                    }
-                    let l = (b / baseline).ln();
-                    let score = overlap * (-0.5 * l * l / (sigma * sigma)).exp();
-                    Some((score, j))
-                })
-                .collect();
-            scored.sort_by(|a, b| b.0.total_cmp(&a.0));
-            scored.truncate(n);
-            scored.into_iter().map(|s| s.1).collect()
-        })
-        .collect()
+use glam::{DVec2, DVec3};
+use scan::{Camera, Frame};
+
+/// Cameras nearer to each other than this see no parallax, in metres.
+pub const LEAST_BASELINE_M: f64 = 0.03;
+/// Farther from each other than this, views differ too much to be compared.
+const MOST_BASELINE_M: f64 = 2.0;
+/// The distance between two cameras that does best: far enough for depth, near enough to look alike.
+const BEST_BASELINE_M: f64 = 0.25;
+/// How fast other distances get worse, as the standard deviation of their natural logarithm.
+const BASELINE_SPREAD: f64 = 0.6;
+/// A source sees at least this share of what the keyframe sees.
+const LEAST_OVERLAP: f64 = 0.25;
+/// Points at which overlap is asked for: a grid of pixels at two depths of a room.
+const GRID: usize = 5;
+const DEPTHS_M: [f64; 2] = [1.5, 3.0];
+
+/// Up to `most` sources of each keyframe, best first, as indices into `keyframes`: by overlap times a preference for the
+/// best baseline. `keyframes` index `frames`.
+pub fn choose(frames: &[Frame], keyframes: &[usize], most: usize) -> Vec<Vec<usize>> {
+    let best_of = |(at, &keyframe): (usize, &usize)| {
+        let reference = &frames[keyframe];
+        let others = keyframes
+            .iter()
+            .enumerate()
+            .filter(|&(other, _)| other != at);
+        let scored = others.filter_map(|(other, &k)| Some((score(reference, &frames[k])?, other)));
+        let mut scored: Vec<(f64, usize)> = scored.collect();
+        // The index breaks ties, so that the choice is the same everywhere.
+        scored.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        scored.truncate(most);
+        scored.into_iter().map(|(_, other)| other).collect()
+    };
+    keyframes.iter().enumerate().map(best_of).collect()
+}
+
+fn score(reference: &Frame, source: &Frame) -> Option<f64> {
+    let baseline_m = reference.pose.translation.distance(source.pose.translation);
+    if !(LEAST_BASELINE_M..=MOST_BASELINE_M).contains(&baseline_m) {
+        return None;
+    }
+    let overlap = overlap(reference, source);
+    if overlap < LEAST_OVERLAP {
+        return None;
+    }
+    let off = (baseline_m / BEST_BASELINE_M).ln() / BASELINE_SPREAD;
+    Some(overlap * (-0.5 * off * off).exp())
+}
+
+/// The share of the reference's view volume that the source sees too.
+fn overlap(reference: &Frame, source: &Frame) -> f64 {
+    let source_from_reference = source.pose.inverse() * reference.pose;
+    let camera = &reference.color_camera;
+    let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+    let part = |i: usize| (i as f64 + 0.5) / GRID as f64;
+    let mut seen = 0;
+    for depth_m in DEPTHS_M {
+        for cell in 0..GRID * GRID {
+            let pixel = DVec2::new(part(cell % GRID) * width, part(cell / GRID) * height);
+            let point = source_from_reference.transform_point3(camera.unproject(pixel, depth_m));
+            seen += usize::from(sees(&source.color_camera, point));
+        }
+    }
+    seen as f64 / (GRID * GRID * DEPTHS_M.len()) as f64
+}
+
+fn sees(camera: &Camera, point: DVec3) -> bool {
+    let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));
+    camera
+        .project(point)
+        .is_some_and(|p| p.cmpge(DVec2::ZERO).all() && p.cmplt(size).all())
 }

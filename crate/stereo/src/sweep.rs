@@ -16,7 +16,7 @@ const BLOCK: usize = 8;
 /// Below every correlation: the source does not see the point.
 const UNSEEN: f32 = -2.0;
 /// An inverse depth cannot be less, in 1/m.
-const LEAST_RHO: f32 = 1e-3;
+pub(crate) const LEAST_RHO: f32 = 1e-3;
 
 /// How views are compared.
 #[derive(Clone, Copy, Debug, PartialEq)]

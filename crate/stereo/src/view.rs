@@ -1,97 +1,131 @@
+//! One keyframe's picture at the working size, and the way from one view's pixels to another's.
+
 use glam::{DAffine3, DMat3, DVec3};
 use scan::{Camera, ColorImage};
 
-#[derive(Clone)]
+/// A posed grey picture.
+#[derive(Clone, Debug)]
 pub struct View {
+    /// Its camera, at the picture's size.
     pub camera: Camera,
+    /// World from camera, metres.
     pub pose: DAffine3,
+    /// Luma of each pixel, 0 to 255, row by row.
     pub gray: Vec<f32>,
 }
 
 impl View {
+    /// A colour picture brought to the size of `camera`.
+    pub fn new(image: &ColorImage, camera: Camera, pose: DAffine3) -> Self {
+        let size = (camera.width as usize, camera.height as usize);
+        let gray = shrink(
+            &luma(image),
+            (image.width as usize, image.height as usize),
+            size,
+        );
+        Self { camera, pose, gray }
+    }
+
+    /// Columns and rows.
     pub fn size(&self) -> (usize, usize) {
         (self.camera.width as usize, self.camera.height as usize)
     }
 }
 
-pub fn fit(camera: &Camera, max_w: u32, max_h: u32) -> Camera {
-    let s = (f64::from(max_w) / f64::from(camera.width))
-        .min(f64::from(max_h) / f64::from(camera.height))
-        .min(1.0);
-    let w = (f64::from(camera.width) * s).round().max(1.0) as u32;
-    let h = (f64::from(camera.height) * s).round().max(1.0) as u32;
-    camera.scaled(w, h)
+/// The camera scaled down to fit into `size` with its proportions kept; never scaled up.
+pub fn fit(camera: &Camera, size: (u32, u32)) -> Camera {
+    let across = f64::from(size.0) / f64::from(camera.width);
+    let down = f64::from(size.1) / f64::from(camera.height);
+    let scale = across.min(down).min(1.0);
+    let scaled = |length: u32| (f64::from(length) * scale).round().max(1.0) as u32;
+    camera.scaled(scaled(camera.width), scaled(camera.height))
 }
 
-/// area-averaging resize of luma
-pub fn gray(image: &ColorImage, w: u32, h: u32) -> Vec<f32> {
-    let (iw, ih) = (image.width as usize, image.height as usize);
-    let (w, h) = (w as usize, h as usize);
-    let luma: Vec<f32> = image
-        .rgb
-        .chunks_exact(3)
-        .map(|p| 0.299 * f32::from(p[0]) + 0.587 * f32::from(p[1]) + 0.114 * f32::from(p[2]))
-        .collect();
-    let spans = |from: usize, to: usize| -> Vec<Vec<(usize, f32)>> {
-        let s = from as f64 / to as f64;
-        (0..to)
-            .map(|i| {
-                let (a, b) = (i as f64 * s, (i + 1) as f64 * s);
-                let mut out = Vec::new();
-                let mut k = a.floor() as usize;
-                while (k as f64) < b && k < from {
-                    let ov = (b.min(k as f64 + 1.0) - a.max(k as f64)) / s;
-                    if ov > 1e-9 {
-                        out.push((k, ov as f32));
-                    }
-                    k += 1;
-                }
-                out
-            })
-            .collect()
-    };
-    let xs = spans(iw, w);
-    let ys = spans(ih, h);
-    let mut rows = vec![0.0f32; ih * w];
-    for y in 0..ih {
-        for (x, span) in xs.iter().enumerate() {
-            rows[y * w + x] = span.iter().map(|&(k, o)| luma[y * iw + k] * o).sum();
+/// ITU-R BT.601 luma.
+fn luma(image: &ColorImage) -> Vec<f32> {
+    let pixels = image.rgb.chunks_exact(3);
+    let luma =
+        |p: &[u8]| 0.299 * f32::from(p[0]) + 0.587 * f32::from(p[1]) + 0.114 * f32::from(p[2]);
+    pixels.map(luma).collect()
+}
+
+/// Resizes by averaging over the area that each new pixel covers, so that nothing is aliased.
+fn shrink(from: &[f32], (width, height): (usize, usize), to: (usize, usize)) -> Vec<f32> {
+    if (width, height) == to {
+        return from.to_vec();
+    }
+    let (columns, rows) = (shares(width, to.0), shares(height, to.1));
+    let mut narrow = vec![0.0f32; height * to.0];
+    for (row, out) in from.chunks_exact(width).zip(narrow.chunks_exact_mut(to.0)) {
+        for (out, share) in out.iter_mut().zip(&columns) {
+            *out = share.iter().map(|&(at, part)| row[at] * part).sum();
         }
     }
-    let mut out = vec![0.0f32; h * w];
-    for (y, span) in ys.iter().enumerate() {
-        for &(k, o) in span {
-            for x in 0..w {
-                out[y * w + x] += rows[k * w + x] * o;
+    let mut small = vec![0.0f32; to.0 * to.1];
+    for (out, share) in small.chunks_exact_mut(to.0).zip(&rows) {
+        for &(at, part) in share {
+            for (out, value) in out.iter_mut().zip(&narrow[at * to.0..]) {
+                *out += value * part;
             }
         }
     }
-    out
+    small
 }
 
-/// source pixel (homogeneous) = a * [x, y, 1] + b * rho
+/// For each of `to` new pixels in a line of `from`: which old ones it covers, and the part of it that each fills.
+fn shares(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
+    let scale = from as f64 / to as f64;
+    let share = |i: usize| {
+        let (start, end) = (i as f64 * scale, (i + 1) as f64 * scale);
+        let covered = start.floor() as usize..(end.ceil() as usize).min(from);
+        let part = |at: usize| (end.min(at as f64 + 1.0) - start.max(at as f64)) / scale;
+        let parts = covered.map(|at| (at, part(at) as f32));
+        parts.filter(|&(_, part)| part > 0.0).collect()
+    };
+    (0..to).map(share).collect()
+}
+
+/// From a pixel `(x, y)` of one view with inverse depth `rho` (1/m) to another view: `a [x, y, 1] + b rho` is the pixel there
+/// times a scale `w`; `rho / w` is the inverse depth there (Hartley and Zisserman, section 9.6: the infinite homography plus
+/// the epipole).
 #[derive(Clone, Copy, Debug)]
 pub struct Warp {
+    /// `K' R K^-1`, by rows.
     pub a: [f32; 9],
+    /// `K' t`.
     pub b: [f32; 3],
 }
 
-pub fn intrinsics(c: &Camera) -> DMat3 {
-    DMat3::from_cols(
-        DVec3::new(c.fx, 0.0, 0.0),
-        DVec3::new(0.0, c.fy, 0.0),
-        DVec3::new(c.cx, c.cy, 1.0),
-    )
+impl Warp {
+    /// The pixel in the other view and the inverse depth there; `None` behind it.
+    pub fn apply(&self, x: f32, y: f32, rho: f32) -> Option<(f32, f32, f32)> {
+        let Self { a, b } = self;
+        let w = a[6] * x + a[7] * y + a[8] + b[2] * rho;
+        (w > 1e-6).then(|| {
+            let u = (a[0] * x + a[1] * y + a[2] + b[0] * rho) / w;
+            let v = (a[3] * x + a[4] * y + a[5] + b[1] * rho) / w;
+            (u, v, rho / w)
+        })
+    }
 }
 
+/// The way from `reference` to `source`.
 pub fn warp(reference: &View, source: &View) -> Warp {
-    let m = source.pose.inverse() * reference.pose;
-    let ks = intrinsics(&source.camera);
-    let kr = intrinsics(&reference.camera).inverse();
-    let a = (ks * m.matrix3 * kr).transpose().to_cols_array();
-    let b = (ks * m.translation).to_array();
+    let source_from_reference = source.pose.inverse() * reference.pose;
+    let to_pixels = intrinsics(&source.camera);
+    let from_pixels = intrinsics(&reference.camera).inverse();
+    let a = to_pixels * source_from_reference.matrix3 * from_pixels;
+    let b = to_pixels * source_from_reference.translation;
     Warp {
-        a: a.map(|v| v as f32),
-        b: b.map(|v| v as f32),
+        a: a.transpose().to_cols_array().map(|v| v as f32),
+        b: b.to_array().map(|v| v as f32),
     }
+}
+
+fn intrinsics(camera: &Camera) -> DMat3 {
+    DMat3::from_cols(
+        DVec3::new(camera.fx, 0.0, 0.0),
+        DVec3::new(0.0, camera.fy, 0.0),
+        DVec3::new(camera.cx, camera.cy, 1.0),
+    )
 }

@@ -160,8 +160,7 @@ fn on_host(base: Option<&[f32]>, offsets: &[f32], config: &SweepConfig) -> Raw {
     let sum = smooth(
         &cost,
         &reference.gray,
-        width as usize,
-        height as usize,
+        (width as usize, height as usize),
         offsets.len(),
         &SMOOTH,
     );

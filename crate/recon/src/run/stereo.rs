@@ -5,6 +5,7 @@ use crate::{
     convert::stereo_view,
     event::{Flow, Sink, Stage},
 };
+use burn::tensor::Device;
 use scan::{Finding, Frame, Scan, Severity};
 use std::collections::HashSet;
 use stereo::{DepthMap, Step, StereoConfig};
@@ -19,11 +20,12 @@ pub(super) async fn fuse(
     scan: &Scan,
     keyframes: &[usize],
     config: &StereoConfig,
+    device: &Device,
     fusion: &mut Fusion,
     sink: &mut impl Sink,
 ) -> Result<(), RunError> {
     sink.stage(Stage::Matching, keyframes.len());
-    let mut stereo = config.init(scan, keyframes)?;
+    let mut stereo = config.init(scan, keyframes, device)?;
     let mut matched = 0;
     // Frames with depth, and what was told: a picture that cannot be used may come up with more than one keyframe.
     let mut given: HashSet<usize> = HashSet::new();
