@@ -29,13 +29,13 @@ SETTINGS = {
     "far_m": 6.0,
     "planes": 128,
     "sources": 12,
-    "sweep": {"radius": 2, "noise_var": 0.25, "best": 0.5},
+    "sweep": {"radius": 2, "noise_var": 0.1, "best": 0.5},
     "smooth": {"p1": 0.1, "p2": 1.0, "edge": 10.0},
     "local_planes": {"radius": 8, "stride": 2, "gray": 10.0, "relative": 0.03, "ridge": 1.0},
     "fine_reach": 8,
     "fine_step": 0.25,
-    "fine_sweep": {"radius": 2, "noise_var": 0.25, "best": 0.5},
-    "fine_smooth": {"p1": 0.05, "p2": 0.3, "edge": 10.0},
+    "fine_sweep": {"radius": 2, "noise_var": 0.1, "best": 0.5},
+    "fine_smooth": {"p1": 0.07, "p2": 0.45, "edge": 10.0},
 }
 LEAST_RHO = 1e-3
 # Sums may be taken in any order; NaN and infinity stay what they are.
@@ -659,11 +659,17 @@ def time_scan(args):
     match(*jobs[0], few, sweep, args.threads)
     runs = []
     for job in jobs:
+        if args.paced:
+            print("ready", flush=True)
+            input()
         wall, cpu = time.perf_counter(), time.process_time()
-        match(*job, SETTINGS, sweep, args.threads)
-        runs.append((time.perf_counter() - wall, time.process_time() - cpu))
-    wall, cpu = np.median(runs, axis=0)
+        _, zncc, _ = match(*job, SETTINGS, sweep, args.threads)
+        runs.append((time.perf_counter() - wall, time.process_time() - cpu, float(zncc.mean())))
+        if args.paced:
+            print(json.dumps(runs[-1]), flush=True)
+    wall, cpu, _ = np.median(runs, axis=0)
     found = {"seconds": wall, "cpu_seconds": cpu, "keyframes": len(jobs), "threads": args.threads}
+    # Of each keyframe: seconds, seconds of all processors, mean correlation.
     print(json.dumps(found | {"sweep": args.sweep, "runs": runs}))
 
 
@@ -677,6 +683,7 @@ def main():
     timing.add_argument("--keyframes", type=int, default=5)
     timing.add_argument("--threads", type=int, default=os.cpu_count())
     timing.add_argument("--sweep", choices=("numba", "numpy"), default="numba")
+    timing.add_argument("--paced", action="store_true", help="each keyframe waits for a line and answers with one")
     timing.set_defaults(run=time_scan)
     args = parser.parse_args()
     if hasattr(args, "threads"):
