@@ -2,12 +2,10 @@
 
 use crate::{
     Recipe, StereoConfig, StereoError, consistency,
-    depth::{self, Raw},
+    depth::Raw,
     fused::{FusedMatcher, most_planes},
-    planes, pose_check,
-    smooth::{self, SmoothConfig},
-    sources,
-    sweep::{self, SweepConfig},
+    pass::Pass,
+    pose_check, sources,
     view::{self, View},
 };
 use burn::tensor::Device;
@@ -21,6 +19,9 @@ use std::{
 const VIEWS_KEPT: usize = 48;
 /// Below this correlation with its neighbours a frame is not where its pose says.
 const LEAST_CORRELATION: f32 = 0.25;
+/// The first few keyframes give depth once this many of their sources are matched, the best first.
+const FIRST_KEYFRAMES: usize = 4;
+const FIRST_WITNESSES: usize = 4;
 /// Neighbours that must have depth before a frame's pose is judged.
 const LEAST_NEIGHBOURS: usize = 2;
 
@@ -65,8 +66,8 @@ pub struct Stereo {
     /// Of each keyframe, as indices into `keyframes`.
     sources: Vec<Vec<usize>>,
     views: Views,
-    /// A keyframe whose first sweep is done.
-    half: Option<(usize, Raw)>,
+    /// The sweep that is going on.
+    pass: Option<Pass>,
     raws: HashMap<usize, Raw>,
     /// Keyframes whose pose was judged.
     judged: HashSet<usize>,
@@ -103,7 +104,7 @@ impl StereoConfig {
             keyframes: keyframes.to_vec(),
             sources,
             views: Views::default(),
-            half: None,
+            pass: None,
             raws: HashMap::new(),
             judged: HashSet::new(),
             next: 0,
@@ -112,13 +113,13 @@ impl StereoConfig {
 }
 
 impl Stereo {
-    /// Does the next step: half a keyframe's matching, or the filtering of one whose sources are matched.
+    /// Does the next step: a part of a keyframe's matching, or the filtering of one whose sources are matched.
     ///
     /// # Errors
     /// A failing device.
     pub async fn advance(&mut self, scan: &Scan) -> Result<Step, StereoError> {
-        if let Some((keyframe, coarse)) = self.half.take() {
-            return self.refine(scan, keyframe, coarse).await;
+        if let Some(pass) = self.pass.take() {
+            return self.go_on(pass).await;
         }
         let Some(&frame) = self.keyframes.get(self.next) else {
             return Ok(Step::Done);
@@ -128,11 +129,25 @@ impl Stereo {
             self.next += 1;
             return Ok(Step::Depth(self.nothing(scan, frame)));
         }
-        let around = std::iter::once(keyframe).chain(self.sources[keyframe].iter().copied());
-        let around: Vec<usize> = around.collect();
+        // The first surface should not wait for all that the first keyframes could be asked about.
+        let witnesses = match keyframe < FIRST_KEYFRAMES {
+            true => FIRST_WITNESSES,
+            false => usize::MAX,
+        };
+        let asked = self.sources[keyframe].iter().take(witnesses);
+        let around: Vec<usize> = std::iter::once(&keyframe).chain(asked).copied().collect();
         let has_depth = |k: &usize| self.raws.contains_key(k) || self.sources[*k].is_empty();
         if let Some(&unmatched) = around.iter().find(|k| !has_depth(k)) {
-            return self.search(scan, unmatched).await;
+            return Ok(match self.decode(scan, unmatched) {
+                Err(finding) => Step::Finding(*finding),
+                Ok((reference, sources)) => {
+                    let planes = self.planes(&reference);
+                    let recipe = &self.recipe;
+                    let pass = Pass::coarse(unmatched, reference, sources, planes, recipe);
+                    self.pass = Some(pass);
+                    Step::Working
+                }
+            });
         }
         for k in around {
             if let Some(finding) = self.misplaced(scan, k) {
@@ -145,43 +160,22 @@ impl Stereo {
         Ok(Step::Depth(map))
     }
 
-    /// The first sweep, over the whole range of depth.
-    async fn search(&mut self, scan: &Scan, keyframe: usize) -> Result<Step, StereoError> {
-        let (reference, sources) = match self.decode(scan, keyframe) {
-            Ok(views) => views,
-            Err(finding) => return Ok(Step::Finding(*finding)),
-        };
-        let offsets = self.planes(&reference);
-        let (sweep, smooth) = (self.recipe.sweep, self.recipe.smooth);
-        let raw = self
-            .matched(&reference, &sources, None, &offsets, (sweep, smooth))
-            .await?;
-        self.half = Some((keyframe, raw));
-        Ok(Step::Working)
-    }
-
-    /// The second sweep, around the local planes of the first.
-    async fn refine(
-        &mut self,
-        scan: &Scan,
-        keyframe: usize,
-        coarse: Raw,
-    ) -> Result<Step, StereoError> {
-        let (reference, sources) = match self.decode(scan, keyframe) {
-            Ok(views) => views,
-            Err(finding) => return Ok(Step::Finding(*finding)),
-        };
-        let weights = planes::weights(&coarse.zncc);
-        let (gray, size) = (&reference.gray, reference.size());
-        let base = planes::local_planes(&coarse.rho, &weights, gray, size, &self.recipe.planes);
-        let planes = self.planes(&reference);
-        let offsets = self.recipe.fine_offsets(planes[1] - planes[0]);
-        let (sweep, smooth) = (self.recipe.fine_sweep, self.recipe.fine_smooth);
-        let raw = self
-            .matched(&reference, &sources, Some(&base), &offsets, (sweep, smooth))
-            .await?;
-        self.raws.insert(keyframe, raw);
-        Ok(Step::Matched)
+    async fn go_on(&mut self, mut pass: Pass) -> Result<Step, StereoError> {
+        let keyframe = pass.keyframe;
+        Ok(match pass.advance(self.kernels.as_mut()).await? {
+            None => {
+                self.pass = Some(pass);
+                Step::Working
+            }
+            Some(found) if !pass.fine => {
+                self.pass = Some(pass.refined(&found, &self.recipe));
+                Step::Working
+            }
+            Some(found) => {
+                self.raws.insert(keyframe, found);
+                Step::Matched
+            }
+        })
     }
 
     /// Inverse depth of the planes in 1/m, evenly spaced from the farthest to the nearest; on every device no more than a
@@ -192,28 +186,6 @@ impl Stereo {
         let (far, near) = (1.0 / self.config.far_m, 1.0 / self.config.near_m);
         let share = |i: usize| i as f32 / (count - 1) as f32;
         (0..count).map(|i| far + (near - far) * share(i)).collect()
-    }
-
-    async fn matched(
-        &mut self,
-        reference: &View,
-        sources: &[(usize, Rc<View>)],
-        base: Option<&[f32]>,
-        offsets: &[f32],
-        (sweep_config, smooth_config): (SweepConfig, SmoothConfig),
-    ) -> Result<Raw, StereoError> {
-        if let Some(kernels) = &mut self.kernels {
-            let sources: Vec<(usize, &View)> = sources.iter().map(|(k, v)| (*k, &**v)).collect();
-            let (sweep, smooth) = (&sweep_config, &smooth_config);
-            return kernels
-                .match_view(reference, &sources, base, offsets, sweep, smooth)
-                .await;
-        }
-        let sources: Vec<&View> = sources.iter().map(|(_, view)| &**view).collect();
-        let cost = sweep::sweep(reference, &sources, base, offsets, &sweep_config);
-        let (size, planes) = (reference.size(), offsets.len());
-        let sum = smooth::smooth(&cost, &reference.gray, size, planes, &smooth_config);
-        Ok(depth::winners(&cost, &sum, base, offsets))
     }
 
     /// A keyframe's picture and those of its sources. One that cannot be decoded is left out from now on, and told.
@@ -290,7 +262,6 @@ impl Stereo {
             sources.retain(|&source| source != keyframe);
         }
         self.raws.remove(&keyframe);
-        self.half = None;
     }
 
     fn filter(&mut self, scan: &Scan, keyframe: usize) -> DepthMap {

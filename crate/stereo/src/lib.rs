@@ -12,6 +12,7 @@ pub mod depth;
 mod driver;
 mod error;
 pub mod fused;
+mod pass;
 pub mod planes;
 mod pose_check;
 mod recipe;

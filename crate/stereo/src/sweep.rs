@@ -8,6 +8,7 @@
 use crate::view::{View, Warp, warp};
 use pulp::Arch;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Rows of a picture that are worked on at a time.
 const BAND: usize = 16;
@@ -38,10 +39,23 @@ pub fn sweep(
     offsets: &[f32],
     config: &SweepConfig,
 ) -> Vec<f32> {
-    let (width, height) = reference.size();
+    let rows = 0..reference.size().1;
+    sweep_rows(reference, sources, base, offsets, config, rows)
+}
+
+/// The same for some rows of the picture: `[rows * width * offsets]`.
+pub fn sweep_rows(
+    reference: &View,
+    sources: &[&View],
+    base: Option<&[f32]>,
+    offsets: &[f32],
+    config: &SweepConfig,
+    rows: Range<usize>,
+) -> Vec<f32> {
+    let width = reference.size().0;
     let planes = offsets.len();
     let warps: Vec<Warp> = sources.iter().map(|s| warp(reference, s)).collect();
-    let mut cost = vec![1.0f32; width * height * planes];
+    let mut cost = vec![1.0f32; rows.len() * width * planes];
     let job = Job {
         reference,
         sources,
@@ -52,8 +66,8 @@ pub fn sweep(
     };
     let bands = cost.par_chunks_mut(BAND * width * planes).enumerate();
     bands.for_each(|(band, out)| {
-        let first = band * BAND;
-        let last = (first + BAND).min(height);
+        let first = rows.start + band * BAND;
+        let last = (first + BAND).min(rows.end);
         Arch::new().dispatch(
             #[inline(always)]
             || match config.radius {
