@@ -9,8 +9,18 @@ import { setup } from './setup.mjs';
 if (!(await setup('test'))) process.exit(1);
 const { build } = await import('./build.mjs');
 await build();
-const output = await must('cargo', ['bench', '--quiet', '--workspace', '--bench', 'fusion'], { env: gpu(buildEnv()) });
-const native = output.split('\n').filter((line) => line.startsWith('|') || line.startsWith('medians')).join('\n').replace('\nmedians', '\n\nmedians');
+
+/** The table of a bench, what it could not measure, and what its figures are. */
+async function native(bench) {
+  const output = await must('cargo', ['bench', '--quiet', '--workspace', '--bench', bench], { env: gpu(buildEnv()) });
+  const lines = output.split('\n');
+  const table = lines.filter((line) => line.startsWith('|'));
+  const notes = [...new Set(lines.filter((line) => line.startsWith('skipped') || line.startsWith('medians')))];
+  return [...table, '', ...notes.flatMap((note) => [note, ''])].join('\n').trimEnd();
+}
+
+const fusion = await native('fusion');
+const stereo = await native('stereo');
 // By its address: the type check of the tools does not follow into the tests.
 const browser = await (await import(new URL('../tests/browser/bench.mjs', import.meta.url).href)).table();
 const text = `# Benchmarks
@@ -24,7 +34,17 @@ play one: the ratios then say nothing about a GPU. The real scans are not part o
 A frame is decoded (the sample room's is drawn while it is read), its bricks are chosen and its depth is integrated; a brick is
 classified, placed and its triangles are made.
 
-${native}
+${fusion}
+
+## Depth from colour alone on the command line: \`flex\` and wgpu against Python
+
+A keyframe is matched with up to 12 sources on 128 planes and then on 17 around its local planes; pictures are decoded, kernels and
+numba's functions compiled before. *numpy* is \`tests/reference/stereo.py\` with NumPy's sweep in a pool of threads and numba for
+smoothing and local planes; *numba* is the same with a sweep that numba compiles too. They take turns keyframe by keyframe, with the
+same threads; CPU seconds are those of all threads. GFLOP/s and GB/s count what the kernels do and must move
+(\`crate/stereo/src/fused/work.rs\`). Equal mean ZNCC says that all did the same work.
+
+${stereo}
 
 ## Fusion on the page: WebGPU against the CPU device (one thread), with pictures drawn meanwhile
 

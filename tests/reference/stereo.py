@@ -595,6 +595,13 @@ def check_compiled(view, others, settings, cost, fine):
 # ---- speed ----
 
 
+def averaging(count, to):
+    """[to, count]: the part of each new pixel that each old one fills."""
+    old, new = np.arange(count), np.arange(to)[:, None] * count / to
+    covered = np.minimum(old + 1, new + count / to) - np.maximum(old, new)
+    return np.maximum(covered, 0) * to / count
+
+
 def read_scan(folder, size):
     """Views of a 7-Scenes folder at the working size."""
     from PIL import Image
@@ -605,15 +612,14 @@ def read_scan(folder, size):
     for pose_file in sorted(folder.glob("frame-*.pose.txt")):
         pose = np.loadtxt(pose_file)
         picture = next(folder.glob(pose_file.name.replace(".pose.txt", ".color.*")))
-        image = np.asarray(Image.open(picture).convert("RGB"), np.float32)
-        luma = Image.fromarray(image @ np.array([0.299, 0.587, 0.114], np.float32))
-        scale = min(size[0] / luma.width, size[1] / luma.height, 1)
-        width, height = round(luma.width * scale), round(luma.height * scale)
-        sx, sy = width / luma.width, height / luma.height
+        luma = np.asarray(Image.open(picture).convert("RGB")) @ np.array([0.299, 0.587, 0.114])
+        scale = min(size[0] / luma.shape[1], size[1] / luma.shape[0], 1)
+        height, width = (round(side * scale) for side in luma.shape)
+        sy, sx = height / luma.shape[0], width / luma.shape[1]
         camera = {"width": width, "height": height, "fx": k[0, 0] * sx, "fy": k[1, 1] * sy}
         camera |= {"cx": (k[0, 2] + 0.5) * sx - 0.5, "cy": (k[1, 2] + 0.5) * sy - 0.5}
-        gray = np.asarray(luma.resize((width, height), Image.Resampling.BOX), np.float32)
-        views.append(View(camera, pose, np.ascontiguousarray(gray)))
+        gray = averaging(luma.shape[0], height) @ luma @ averaging(luma.shape[1], width).T
+        views.append(View(camera, pose, gray.astype(np.float32)))
     return views
 
 
@@ -625,7 +631,7 @@ def choose_sources(views, index, count):
     x, y = np.meshgrid(x, y)
     for k, source in enumerate(views):
         baseline = np.linalg.norm(source.pose[:3, 3] - reference.pose[:3, 3])
-        if k == index or not baseline >= 0.03:
+        if k == index or not 0.03 <= baseline <= 2:
             continue
         a, b = warp(reference, source)
         seen = []
