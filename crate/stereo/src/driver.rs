@@ -55,6 +55,13 @@ pub enum Step {
     Done,
 }
 
+/// A matched keyframe.
+struct Found {
+    raw: Raw,
+    /// The correlation at its depth in a wider window.
+    proof: Vec<f32>,
+}
+
 /// Stereo over a scan.
 pub struct Stereo {
     /// The numbers it goes by; the defaults unless an experiment changes them.
@@ -68,7 +75,7 @@ pub struct Stereo {
     views: Views,
     /// The sweep that is going on.
     pass: Option<Pass>,
-    raws: HashMap<usize, Raw>,
+    found: HashMap<usize, Found>,
     /// Keyframes whose pose was judged.
     judged: HashSet<usize>,
     next: usize,
@@ -105,7 +112,7 @@ impl StereoConfig {
             sources,
             views: Views::default(),
             pass: None,
-            raws: HashMap::new(),
+            found: HashMap::new(),
             judged: HashSet::new(),
             next: 0,
         })
@@ -136,7 +143,7 @@ impl Stereo {
         };
         let asked = self.sources[keyframe].iter().take(witnesses);
         let around: Vec<usize> = std::iter::once(&keyframe).chain(asked).copied().collect();
-        let has_depth = |k: &usize| self.raws.contains_key(k) || self.sources[*k].is_empty();
+        let has_depth = |k: &usize| self.found.contains_key(k) || self.sources[*k].is_empty();
         if let Some(&unmatched) = around.iter().find(|k| !has_depth(k)) {
             return Ok(match self.decode(scan, unmatched) {
                 Err(finding) => Step::Finding(*finding),
@@ -172,7 +179,8 @@ impl Stereo {
                 Step::Working
             }
             Some(found) => {
-                self.raws.insert(keyframe, found);
+                let proof = pass.prove(&found, &self.recipe);
+                self.found.insert(keyframe, Found { raw: found, proof });
                 Step::Matched
             }
         })
@@ -214,7 +222,7 @@ impl Stereo {
         if self.judged.contains(&keyframe) {
             return None;
         }
-        let known = |k: &usize| self.raws.contains_key(k);
+        let known = |k: &usize| self.found.contains_key(k);
         let neighbours: Vec<usize> = self.sources[keyframe]
             .iter()
             .copied()
@@ -230,7 +238,7 @@ impl Stereo {
             .iter()
             .map(|&k| self.views.get(scan, self.keyframes[k], size).ok())
             .collect::<Option<_>>()?;
-        let raws = neighbours.iter().map(|k| &self.raws[k]);
+        let raws = neighbours.iter().map(|k| &self.found[k].raw);
         let asked: Vec<(&View, &Raw)> = pictures.iter().map(|v| &**v).zip(raws).collect();
         let correlation = pose_check::correlation(&view, &asked)?;
         self.judged.insert(keyframe);
@@ -261,7 +269,7 @@ impl Stereo {
         for sources in &mut self.sources {
             sources.retain(|&source| source != keyframe);
         }
-        self.raws.remove(&keyframe);
+        self.found.remove(&keyframe);
     }
 
     fn filter(&mut self, scan: &Scan, keyframe: usize) -> DepthMap {
@@ -270,26 +278,32 @@ impl Stereo {
         let sources = self.sources[keyframe].clone();
         let witnesses: Vec<(usize, Rc<View>)> = sources
             .into_iter()
-            .filter(|k| self.raws.contains_key(k))
+            .filter(|k| self.found.contains_key(k))
             .filter_map(|k| Some((k, self.views.get(scan, self.keyframes[k], size).ok()?)))
             .collect();
-        let (Some(raw), Ok(view)) = (self.raws.get(&keyframe), self.views.get(scan, frame, size))
+        let (Some(Found { raw, proof }), Ok(view)) =
+            (self.found.get(&keyframe), self.views.get(scan, frame, size))
         else {
             return self.nothing(scan, frame);
         };
         let asked: Vec<(&View, &[f32])> = witnesses
             .iter()
-            .map(|(k, view)| (&**view, self.raws[k].rho.as_slice()))
+            .map(|(k, view)| (&**view, self.found[k].raw.rho.as_slice()))
             .collect();
         let verdicts = consistency::judge(&view, &raw.rho, &asked);
         let recipe = &self.recipe;
-        let confidence = verdicts.iter().zip(&raw.unique).map(|(verdict, &unique)| {
+        let judged = verdicts.iter().zip(&raw.unique).zip(proof);
+        let confidence = judged.map(|((verdict, &unique), &proof)| {
             let least = match verdict.agree {
                 0 | 1 => recipe.least_confidence_alone,
                 _ => recipe.least_confidence,
             };
             let confidence = verdict.confidence(unique);
-            if confidence >= least { confidence } else { 0.0 }
+            if confidence >= least && proof >= recipe.least_proof {
+                confidence
+            } else {
+                0.0
+            }
         });
         let confidence: Vec<f32> = confidence.collect();
         let kept = raw.rho.iter().zip(&confidence);
@@ -325,7 +339,7 @@ impl Stereo {
             .flatten()
             .copied()
             .collect();
-        self.raws
+        self.found
             .retain(|k, _| to_come.contains(k) || asked.contains(k));
     }
 }

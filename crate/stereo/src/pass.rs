@@ -76,6 +76,15 @@ impl Pass {
         }
     }
 
+    /// The correlation of each pixel at the depth that was found, in the wider window of [`Recipe::proof`]; 0 where no
+    /// source sees the point.
+    pub(crate) fn prove(&self, found: &Raw, recipe: &Recipe) -> Vec<f32> {
+        let sources: Vec<&View> = self.sources.iter().map(|(_, view)| &**view).collect();
+        let at_depth = Some(found.rho.as_slice());
+        let cost = sweep::sweep(&self.reference, &sources, at_depth, &[0.0], &recipe.proof);
+        cost.iter().map(|cost| 1.0 - cost).collect()
+    }
+
     /// Goes on, on the device if there are kernels for it; the result once there is one.
     pub(crate) async fn advance(
         &mut self,

@@ -20,6 +20,11 @@ pub struct Recipe {
     pub fine_sweep: SweepConfig,
     /// How neighbours agree the second time: on how far they lie off their planes.
     pub fine_smooth: SmoothConfig,
+    /// How views are compared once more at the depth that was found, in a wider window: noise that happened to match in the
+    /// narrow one does not fill it, faint texture does.
+    pub proof: SweepConfig,
+    /// A depth is kept from this correlation on in that comparison.
+    pub least_proof: f32,
     /// A depth that two sources agree with is kept from this confidence on.
     pub least_confidence: f32,
     /// A depth that a single source agrees with is kept from this confidence on.
@@ -55,6 +60,8 @@ impl Default for Recipe {
                 p2: 0.45,
                 edge: 10.0,
             },
+            proof: SweepConfig { radius: 4, ..sweep },
+            least_proof: 0.2,
             least_confidence: 0.2,
             least_confidence_alone: 0.3,
         }
