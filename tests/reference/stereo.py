@@ -21,7 +21,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numba import njit, prange
-from scipy import ndimage
 
 # What crate/stereo goes by; the golden file carries them along.
 SETTINGS = {
@@ -69,48 +68,61 @@ def hypotheses(base, offset):
     return offset if base is None else np.maximum(base + base.dtype.type(offset), LEAST_RHO)
 
 
-def sample(source, gray, a, b, rho, rows, columns):
+def sample(gray, at_infinity, b, rho):
     """Grey values of a source where the hypotheses fall, and which of them it sees."""
     height, width = gray.shape
-    z = a[2, 0] * columns + a[2, 1] * rows + a[2, 2] + b[2] * rho
+    last_u, last_v = gray.dtype.type(width - 1.001), gray.dtype.type(height - 1.001)
     with np.errstate(divide="ignore", invalid="ignore"):
-        u = (a[0, 0] * columns + a[0, 1] * rows + a[0, 2] + b[0] * rho) / z
-        v = (a[1, 0] * columns + a[1, 1] * rows + a[1, 2] + b[1] * rho) / z
-    seen = (z > 1e-6) & (u >= 0) & (v >= 0) & (u <= width - 1.001) & (v <= height - 1.001)
-    u = np.clip(np.nan_to_num(u), 0, gray.dtype.type(width - 1.001))
-    v = np.clip(np.nan_to_num(v), 0, gray.dtype.type(height - 1.001))
-    left, top = u.astype(np.int32), v.astype(np.int32)
-    u, v, at = u - left, v - top, top * width + left
+        z = at_infinity[2] + b[2] * rho
+        inverse = 1 / z
+        u, v = (at_infinity[0] + b[0] * rho) * inverse, (at_infinity[1] + b[1] * rho) * inverse
+        seen = (z > 1e-6) & (u >= 0) & (v >= 0) & (u <= last_u) & (v <= last_v)
+        # What is not a number becomes 0.
+        u, v = np.fmin(np.fmax(u, 0), last_u), np.fmin(np.fmax(v, 0), last_v)
+    left, top = u.astype(np.int64), v.astype(np.int64)
+    at = top * width + left
+    u -= left.astype(gray.dtype)
+    v -= top.astype(gray.dtype)
     flat = gray.ravel()
-    upper = flat[at] * (1 - u) + flat[at + 1] * u
-    lower = flat[at + width] * (1 - u) + flat[at + width + 1] * u
-    return upper * (1 - v) + lower * v, seen
+    upper, lower = flat.take(at), flat.take(at + width)
+    upper += (flat.take(at + 1) - upper) * u
+    lower += (flat.take(at + width + 1) - lower) * u
+    upper += (lower - upper) * v
+    return upper, seen
 
 
 def box(image, radius):
     """Sums over the window, as much of it as lies in the picture."""
-    ones = np.ones(2 * radius + 1)
-    along = ndimage.correlate1d(image, ones, axis=1, mode="constant")
-    return ndimage.correlate1d(along, ones, axis=0, mode="constant")
+    height, width = image.shape
+    padded = np.pad(image, radius)
+    along = padded[:, :width].copy()
+    for k in range(1, 2 * radius + 1):
+        along += padded[:, k : k + width]
+    out = along[:height].copy()
+    for k in range(1, 2 * radius + 1):
+        out += along[k : k + height]
+    return out
 
 
 def sweep_numpy(reference, sources, base, offsets, config, threads=1):
     """Cost [height, width, planes]: 1 - the mean of the best share of the correlations; 1 where no source sees."""
     gray, radius = reference.gray, config["radius"]
     kind = gray.dtype.type
-    rows, columns = np.mgrid[: gray.shape[0], : gray.shape[1]].astype(gray.dtype)
+    rows, columns = np.mgrid[: gray.shape[0], : gray.shape[1]]
+    pixels = np.stack([columns, rows, np.ones_like(rows)]).astype(gray.dtype)
     count = box(np.ones_like(gray), radius)
     mean = box(gray, radius) / count
     noise = count * kind(config["noise_var"])
     deviation = np.maximum(box(gray * gray, radius) - count * mean * mean, 0) + noise
     warps = [tuple(m.astype(gray.dtype) for m in warp(reference, s)) for s in sources]
+    warps = [(np.tensordot(a, pixels, 1), b) for a, b in warps]
     cost = np.empty(gray.shape + (len(offsets),), gray.dtype)
 
     def plane(d):
         rho = hypotheses(base, kind(offsets[d]))
         scores = np.empty((len(sources),) + gray.shape, gray.dtype)
-        for k, (source, (a, b)) in enumerate(zip(sources, warps)):
-            other, seen = sample(source, source.gray, a, b, rho, rows, columns)
+        for k, (source, (at_infinity, b)) in enumerate(zip(sources, warps)):
+            other, seen = sample(source.gray, at_infinity, b, rho)
             total = box(other, radius)
             covariance = box(gray * other, radius) - mean * total
             spread = np.maximum(box(other * other, radius) - total * total / count, 0) + noise
