@@ -44,7 +44,7 @@ export function drawPlan({ state, plan, ready, opened }: Model): void {
     ...(choosing || !stereo ? [] : [["Photos scaled to", pixels(stereoSize)] as const]),
     ...(choosing ? [] : [["Voxel size", centimetres(voxelSizeM)] as const, ["Depth up to", `${plain(maxDepthM)} m`] as const]),
     ["Bricks", `about ${count(plan.bricks)}`],
-    [ready?.device === "cpu" ? "Volume" : "Graphics memory", `about ${bytes(plan.deviceBytes)}`],
+    [ready?.device === "cpu" ? "Working memory" : "Graphics memory", `about ${bytes(plan.deviceBytes)}`],
     ["Engine memory", `about ${bytes(plan.heapBytes)}`],
   ]);
   write(byId("gravity"), opened ? `Up: ${opened.gravity}.` : "");
