@@ -76,12 +76,16 @@ impl Pass {
         }
     }
 
-    /// The correlation of each pixel at the depth that was found, in the wider window of [`Recipe::proof`]; 0 where no
-    /// source sees the point.
+    /// The correlation of each pixel at the depth that was found, in the wider window of [`Recipe::proof`] and with the
+    /// noise that the picture has; 0 where no source sees the point.
     pub(crate) fn prove(&self, found: &Raw, recipe: &Recipe) -> Vec<f32> {
         let sources: Vec<&View> = self.sources.iter().map(|(_, view)| &**view).collect();
         let at_depth = Some(found.rho.as_slice());
-        let cost = sweep::sweep(&self.reference, &sources, at_depth, &[0.0], &recipe.proof);
+        let config = SweepConfig {
+            noise_var: recipe.proof.noise_var.max(self.reference.noise_var()),
+            ..recipe.proof
+        };
+        let cost = sweep::sweep(&self.reference, &sources, at_depth, &[0.0], &config);
         cost.iter().map(|cost| 1.0 - cost).collect()
     }
 

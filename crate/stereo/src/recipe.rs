@@ -21,7 +21,7 @@ pub struct Recipe {
     /// How neighbours agree the second time: on how far they lie off their planes.
     pub fine_smooth: SmoothConfig,
     /// How views are compared once more at the depth that was found, in a wider window: noise that happened to match in the
-    /// narrow one does not fill it, faint texture does.
+    /// narrow one does not fill it, faint texture does. Its variance of noise is the least; a picture may have more.
     pub proof: SweepConfig,
     /// A depth is kept from this correlation on in that comparison.
     pub least_proof: f32,

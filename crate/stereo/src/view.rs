@@ -3,6 +3,11 @@
 use glam::{DAffine3, DMat3, DVec3};
 use scan::{Camera, ColorImage};
 
+/// Noise is looked for in windows of this radius, a few pixels apart, in the blankest of so many.
+const NOISE_RADIUS: usize = 2;
+const NOISE_STRIDE: usize = 3;
+const BLANKEST: usize = 20;
+
 /// A posed grey picture.
 #[derive(Clone, Debug)]
 pub struct View {
@@ -24,6 +29,30 @@ impl View {
             size,
         );
         Self { camera, pose, gray }
+    }
+
+    /// The variance of the camera's noise in squared grey levels, as far as the picture tells: what is left where it is
+    /// blankest, the 5th percentile of the variances in windows of 5x5.
+    pub fn noise_var(&self) -> f32 {
+        let (width, height) = self.size();
+        let side = 2 * NOISE_RADIUS + 1;
+        let columns = (0..width.saturating_sub(side)).step_by(NOISE_STRIDE);
+        let rows = (0..height.saturating_sub(side)).step_by(NOISE_STRIDE);
+        let corners = rows.flat_map(|y| columns.clone().map(move |x| y * width + x));
+        let variance = |corner: usize| {
+            let rows = (0..side).map(|row| &self.gray[corner + row * width..][..side]);
+            let (sum, squares) = rows
+                .flatten()
+                .fold((0.0, 0.0), |(s, ss), v| (s + v, ss + v * v));
+            let count = (side * side) as f32;
+            (squares / count - (sum / count) * (sum / count)).max(0.0)
+        };
+        let mut variances: Vec<f32> = corners.map(variance).collect();
+        if variances.is_empty() {
+            return 0.0;
+        }
+        let rank = variances.len() / BLANKEST;
+        *variances.select_nth_unstable_by(rank, f32::total_cmp).1
     }
 
     /// Columns and rows.
