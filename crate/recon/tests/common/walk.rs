@@ -240,10 +240,7 @@ impl Ran {
         mesh.transform(&self.scan.scan_from_canonical());
         let near = |p: &&Vec3| room.distance(**p).abs() < 0.05;
         let right = mesh.positions.iter().filter(near).count();
-        (
-            right as f32 / mesh.positions.len() as f32,
-            mesh.area().into(),
-        )
+        (right as f32 / mesh.positions.len() as f32, mesh.area())
     }
 }
 
