@@ -247,7 +247,7 @@ fn a_full_volume_ends_fusing_and_loses_nothing() {
     let limits = Limits::default();
     let mut plan = recon::plan(&scan, &limits, options()).unwrap();
     // Room for some keyframes, not for all: as if the guess had been far too low.
-    plan.volume.binding_bytes = 600 * 512 * 4 * 4;
+    plan.volume.binding_bytes = 1000 * 512 * 4 * 4;
     let mut sink = Recorder {
         watching: true,
         ..Recorder::default()

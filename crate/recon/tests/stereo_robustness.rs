@@ -313,3 +313,24 @@ fn pictures_of_nothing_but_a_blank_wall_give_nothing() {
         assert!(whole.coverage() < 0.04, "{whole}");
     }
 }
+#[test]
+fn scratch() {
+    let short = |ran: &Ran| told(ran).iter().map(|t| { let a: String = t.chars().take(16).collect(); let b = t.find("found").map(|i| t[i..].chars().take(60).collect::<String>()).unwrap_or_default(); format!("{a}..{b}") }).collect::<Vec<_>>();
+    for spoiled in [0, 1, 8, 15] {
+        for (m, deg) in [(0.4, 10.0), (0.2, 5.0), (0.2, 0.0), (0.1, 2.0), (0.0, 3.0), (-0.4, 0.0), (1.0, 0.0), (1.0, 30.0), (0.0, 60.0), (0.0, 180.0)] {
+            let ran = clean().with(spoiled, |s| s.misplace(m, deg)).run(config());
+            println!("{spoiled} {m} {deg}: {} {:?} own {}", clean().quality_but(&ran, &[spoiled], everywhere), short(&ran), ran.map(spoiled).map_or(-1.0, |m| clean().quality(&ran, m, everywhere).coverage()));
+        }
+    }
+    for group in [vec![7, 8], vec![6, 7, 8, 9], vec![3, 8, 12], (8..16).collect()] {
+        let mut w = clean().clone();
+        for g in &group { w.shots.get_mut(g).unwrap().misplace(0.4, 10.0); }
+        let ran = w.run(config());
+        println!("{group:?}: {} {:?}", w.quality_but(&ran, &group, everywhere), short(&ran));
+    }
+    // A picture of another place.
+    let mut w = clean().clone();
+    w.shots.get_mut(&8).unwrap().rgb = clean().shots[&2].rgb.clone();
+    let ran = w.run(config());
+    println!("picture of 2 in 8: {} {:?}", w.quality_but(&ran, &[8], everywhere), short(&ran));
+}
