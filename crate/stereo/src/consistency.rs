@@ -53,27 +53,15 @@ struct Witness<'a> {
 
 /// The verdict on each pixel of `reference`, whose inverse depth is `rho` (1/m, `[height * width]`), by the inverse depth of
 /// its sources.
-pub fn judge(reference: &View, rho: &[f32], sources: &[(&View, &[f32])]) -> Vec<Verdict> {
+pub fn judge<'a>(reference: &View, rho: &[f32], sources: &[(&View, &'a [f32])]) -> Vec<Verdict> {
     let width = reference.size().0;
-    let witness = |(source, rho): &(&View, &'_ [f32])| -> (Warp, Warp, (usize, usize), usize) {
-        (
-            warp(reference, source),
-            warp(source, reference),
-            source.size(),
-            rho.len(),
-        )
+    let witness = |&(source, rho): &(&View, &'a [f32])| Witness {
+        to: warp(reference, source),
+        back: warp(source, reference),
+        rho,
+        size: source.size(),
     };
-    let known: Vec<_> = sources.iter().map(witness).collect();
-    let witnesses: Vec<Witness<'_>> = known
-        .into_iter()
-        .zip(sources)
-        .map(|((to, back, size, _), (_, rho))| Witness {
-            to,
-            back,
-            rho,
-            size,
-        })
-        .collect();
+    let witnesses: Vec<Witness<'_>> = sources.iter().map(witness).collect();
     let mut verdicts = vec![Verdict::default(); rho.len()];
     let pixels = verdicts.par_iter_mut().zip(rho).enumerate();
     pixels.for_each(|(at, (verdict, &rho))| {
