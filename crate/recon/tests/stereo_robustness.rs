@@ -191,12 +191,12 @@ fn a_frame_with_motion_blur_spoils_nothing() {
 #[test]
 fn a_frame_with_a_wrong_pose_is_left_out_and_named() {
     let mut failures = Vec::new();
-    for spoiled in [3, SPOILED, 12] {
+    for spoiled in [0, SPOILED, FRAMES - 1] {
         let without = clean().without(spoiled).run(config());
         let before = clean().quality_but(&without, &[], everywhere);
         let (right, area_m2) = without.mesh(&clean().room);
         println!("without frame {spoiled}: {before}, mesh {right:.4} right, {area_m2:.2} m2");
-        for (right_m, degrees) in [(0.4, 10.0), (-0.4, -10.0), (0.0, 10.0), (2.0, 10.0)] {
+        for (right_m, degrees) in [(0.4, 10.0), (-0.4, -10.0), (2.0, 10.0)] {
             let what = format!("frame {spoiled} off by {right_m} m and {degrees} degrees");
             let walk = clean().with(spoiled, |shot| shot.misplace(right_m, degrees));
             let ran = walk.run(config());
@@ -220,6 +220,37 @@ fn a_frame_with_a_wrong_pose_is_left_out_and_named() {
         }
     }
     assert!(failures.is_empty(), "{failures:#?}");
+}
+
+/// A tracker that is lost for a while, and now and then; and a picture that belongs to another place.
+#[test]
+fn several_wrong_frames_are_named_and_nobody_else() {
+    let (others, _) = clean_figures();
+    let named = |ran: &Ran, wrong: &[usize]| {
+        let accused = |f: &scan::Finding| (f.code, f.file.clone().unwrap_or_default());
+        let mut accused: Vec<_> = ran.findings.iter().map(accused).collect();
+        accused.sort();
+        let wrong = wrong.iter().map(|n| format!("frame-{n:06}.color.png"));
+        let wrong: Vec<_> = wrong.map(|file| ("stereo-pose", file)).collect();
+        assert_eq!(accused, wrong);
+    };
+    for wrong in [vec![7, 8], vec![3, 8, 12]] {
+        let mut walk = clean().clone();
+        for number in &wrong {
+            let shot = walk.shots.get_mut(number).unwrap();
+            shot.misplace(0.4, 10.0);
+        }
+        let ran = walk.run(config());
+        named(&ran, &wrong);
+        let found = walk.quality_but(&ran, &wrong, everywhere);
+        assert_near(&format!("but {wrong:?}"), &found, &others);
+    }
+    let elsewhere = clean().shots[&2].rgb.clone();
+    let walk = clean().with(SPOILED, |shot| shot.rgb = elsewhere);
+    let ran = walk.run(config());
+    named(&ran, &[SPOILED]);
+    let found = walk.quality_but(&ran, &[SPOILED], everywhere);
+    assert_near("but a picture of elsewhere", &found, &others);
 }
 
 #[test]
@@ -312,25 +343,4 @@ fn pictures_of_nothing_but_a_blank_wall_give_nothing() {
         );
         assert!(whole.coverage() < 0.04, "{whole}");
     }
-}
-#[test]
-fn scratch() {
-    let short = |ran: &Ran| told(ran).iter().map(|t| { let a: String = t.chars().take(16).collect(); let b = t.find("found").map(|i| t[i..].chars().take(60).collect::<String>()).unwrap_or_default(); format!("{a}..{b}") }).collect::<Vec<_>>();
-    for spoiled in [0, 1, 8, 15] {
-        for (m, deg) in [(0.4, 10.0), (0.2, 5.0), (0.2, 0.0), (0.1, 2.0), (0.0, 3.0), (-0.4, 0.0), (1.0, 0.0), (1.0, 30.0), (0.0, 60.0), (0.0, 180.0)] {
-            let ran = clean().with(spoiled, |s| s.misplace(m, deg)).run(config());
-            println!("{spoiled} {m} {deg}: {} {:?} own {}", clean().quality_but(&ran, &[spoiled], everywhere), short(&ran), ran.map(spoiled).map_or(-1.0, |m| clean().quality(&ran, m, everywhere).coverage()));
-        }
-    }
-    for group in [vec![7, 8], vec![6, 7, 8, 9], vec![3, 8, 12], (8..16).collect()] {
-        let mut w = clean().clone();
-        for g in &group { w.shots.get_mut(g).unwrap().misplace(0.4, 10.0); }
-        let ran = w.run(config());
-        println!("{group:?}: {} {:?}", w.quality_but(&ran, &group, everywhere), short(&ran));
-    }
-    // A picture of another place.
-    let mut w = clean().clone();
-    w.shots.get_mut(&8).unwrap().rgb = clean().shots[&2].rgb.clone();
-    let ran = w.run(config());
-    println!("picture of 2 in 8: {} {:?}", w.quality_but(&ran, &[8], everywhere), short(&ran));
 }
