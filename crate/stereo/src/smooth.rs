@@ -5,7 +5,6 @@
 //! `L(p, d) = C(p, d) + min(L(q, d), L(q, d ± 1) + P1, min L(q) + P2') - min L(q)`, with
 //! `P2' = max(P1, P2 / (1 + |I(p) - I(q)| / edge))`; a path starts with its cost. The result is the sum over the eight.
 
-use pulp::Arch;
 use rayon::prelude::*;
 
 /// What a change of plane costs.
@@ -23,7 +22,7 @@ pub struct SmoothConfig {
 const PIXELS_A_TASK: usize = 32;
 
 /// The paths of one pass come from the row before, from these columns.
-const FROM: [i32; 3] = [-1, 0, 1];
+const FROM: [isize; 3] = [-1, 0, 1];
 
 /// The sums, laid out as `cost`: `[height * width * planes]`, planes innermost. `gray` has `[height * width]` values.
 pub fn smooth(
@@ -43,12 +42,7 @@ pub fn smooth(
     };
     let mut sum = vec![0.0f32; cost.len()];
     let rows = sum.par_chunks_mut(width * planes).enumerate();
-    rows.for_each(|(y, sum)| {
-        Arch::new().dispatch(
-            #[inline(always)]
-            || job.along_row(y, sum),
-        );
-    });
+    rows.for_each(|(y, sum)| job.along_row(y, sum));
     job.across_rows(&mut sum, false);
     job.across_rows(&mut sum, true);
     sum
@@ -74,8 +68,23 @@ impl Job<'_> {
     }
 
     /// The two paths along a row.
-    #[inline(always)]
     fn along_row(&self, y: usize, sum: &mut [f32]) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor was asked just now.
+            return unsafe { self.along_row_avx2(y, sum) };
+        }
+        self.along_row_anywhere(y, sum);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn along_row_avx2(&self, y: usize, sum: &mut [f32]) {
+        self.along_row_anywhere(y, sum);
+    }
+
+    #[inline(always)]
+    fn along_row_anywhere(&self, y: usize, sum: &mut [f32]) {
         let mut before = vec![0.0f32; self.planes];
         let mut path = vec![0.0f32; self.planes];
         for backwards in [false, true] {
@@ -117,70 +126,99 @@ impl Job<'_> {
             let pixels = pixels
                 .zip(row.par_chunks_mut(PIXELS_A_TASK * planes))
                 .enumerate();
+            let row = Row {
+                y,
+                from: (i > 0).then(|| if upwards { y + 1 } else { y - 1 }),
+                before: &before,
+                least_before: &least_before,
+            };
             pixels.for_each(|(task, ((path, least), sum))| {
-                Arch::new().dispatch(
-                    #[inline(always)]
-                    || {
-                        let pixels = path
-                            .chunks_exact_mut(paths)
-                            .zip(least.chunks_exact_mut(FROM.len()));
-                        for (k, ((path, least), sum)) in
-                            pixels.zip(sum.chunks_exact_mut(planes)).enumerate()
-                        {
-                            let x = task * PIXELS_A_TASK + k;
-                            let from_row = (i > 0).then(|| if upwards { y + 1 } else { y - 1 });
-                            self.come_from_row(x, y, from_row, &before, &least_before, path, least);
-                            for path in path.chunks_exact(planes) {
-                                add(sum, path);
-                            }
-                        }
-                    },
-                );
+                self.pixels(&row, task * PIXELS_A_TASK, path, least, sum);
             });
             std::mem::swap(&mut before, &mut path);
             std::mem::swap(&mut least_before, &mut least);
         }
     }
 
-    #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
-    fn come_from_row(
+    /// Some pixels of a row, from column `first` on.
+    fn pixels(
         &self,
-        x: usize,
-        y: usize,
-        from_row: Option<usize>,
-        before: &[f32],
-        least_before: &[f32],
+        row: &Row,
+        first: usize,
         path: &mut [f32],
         least: &mut [f32],
+        sum: &mut [f32],
     ) {
-        let at = y * self.width + x;
-        for ((direction, dx), path) in FROM
-            .into_iter()
-            .enumerate()
-            .zip(path.chunks_exact_mut(self.planes))
-        {
-            let from_x = x
-                .checked_add_signed(dx as isize)
-                .filter(|&x| x < self.width);
-            least[direction] = match (from_row, from_x) {
-                (Some(from_row), Some(from_x)) => {
-                    let index = from_x * FROM.len() + direction;
-                    let before = &before[index * self.planes..(index + 1) * self.planes];
-                    let far = self.far_penalty(at, from_row * self.width + from_x);
-                    step(
-                        self.cost(at),
-                        before,
-                        least_before[index],
-                        self.config.p1,
-                        far,
-                        path,
-                    )
-                }
-                _ => start(self.cost(at), path),
-            };
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor was asked just now.
+            return unsafe { self.pixels_avx2(row, first, path, least, sum) };
+        }
+        self.pixels_anywhere(row, first, path, least, sum);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn pixels_avx2(
+        &self,
+        row: &Row,
+        first: usize,
+        path: &mut [f32],
+        least: &mut [f32],
+        sum: &mut [f32],
+    ) {
+        self.pixels_anywhere(row, first, path, least, sum);
+    }
+
+    #[inline(always)]
+    fn pixels_anywhere(
+        &self,
+        row: &Row,
+        first: usize,
+        path: &mut [f32],
+        least: &mut [f32],
+        sum: &mut [f32],
+    ) {
+        let pixels = path.chunks_exact_mut(FROM.len() * self.planes);
+        let pixels = pixels.zip(least.chunks_exact_mut(FROM.len()));
+        let pixels = pixels.zip(sum.chunks_exact_mut(self.planes)).enumerate();
+        for (k, ((paths, least), sum)) in pixels {
+            let x = first + k;
+            let at = row.y * self.width + x;
+            let paths = paths.chunks_exact_mut(self.planes).zip(least);
+            for ((direction, dx), (path, least)) in FROM.into_iter().enumerate().zip(paths) {
+                let from_x = x.checked_add_signed(dx).filter(|&x| x < self.width);
+                *least = match (row.from, from_x) {
+                    (Some(from_row), Some(from_x)) => {
+                        let index = from_x * FROM.len() + direction;
+                        let before = &row.before[index * self.planes..(index + 1) * self.planes];
+                        let far = self.far_penalty(at, from_row * self.width + from_x);
+                        let least_before = row.least_before[index];
+                        step(
+                            self.cost(at),
+                            before,
+                            least_before,
+                            self.config.p1,
+                            far,
+                            path,
+                        )
+                    }
+                    _ => start(self.cost(at), path),
+                };
+                add(sum, path);
+            }
         }
     }
+}
+
+/// A row that paths come into.
+struct Row<'a> {
+    y: usize,
+    /// The row that they come from; none where they start.
+    from: Option<usize>,
+    /// Their values there, and the least of each.
+    before: &'a [f32],
+    least_before: &'a [f32],
 }
 
 /// A path's first values are the costs. Gives their least.
