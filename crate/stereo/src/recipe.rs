@@ -61,7 +61,7 @@ impl Default for Recipe {
                 edge: 10.0,
             },
             proof: SweepConfig { radius: 4, ..sweep },
-            least_proof: 0.2,
+            least_proof: 0.3,
             least_confidence: 0.2,
             least_confidence_alone: 0.3,
         }

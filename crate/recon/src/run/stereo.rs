@@ -11,6 +11,8 @@ use std::collections::HashSet;
 use stereo::{DepthMap, Step, StereoConfig};
 use volume::VolumeError;
 
+/// A keyframe with depth in no more than one in so many pixels has none: those few are where noise looked alike.
+const LEAST_SHARE: usize = 200;
 /// Keyframes that a finding names before it says how many more there are.
 const NAMED: usize = 3;
 
@@ -43,7 +45,8 @@ pub(super) async fn fuse(
             }
             Step::Depth(map) => {
                 sink.depth_map(&map);
-                if !map.depth_m.iter().any(|&z| z > 0.0) {
+                let known = map.depth_m.iter().filter(|&&z| z > 0.0).count();
+                if known * LEAST_SHARE <= map.depth_m.len() {
                     continue;
                 }
                 given.insert(map.frame);
