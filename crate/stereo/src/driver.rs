@@ -64,8 +64,7 @@ struct Found {
 
 /// Stereo over a scan.
 pub struct Stereo {
-    /// The numbers it goes by; the defaults unless an experiment changes them.
-    pub recipe: Recipe,
+    recipe: Recipe,
     config: StereoConfig,
     /// The kernels, where the device runs them.
     kernels: Option<FusedMatcher>,
