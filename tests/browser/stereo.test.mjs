@@ -160,7 +160,7 @@ test('with depth and photos there is a choice, and the sensor comes first', asyn
   assert.ok(await page.getByLabel('Photos scaled to').isHidden(), 'photos are scaled for stereo alone');
   await source.selectOption('the photos');
   await page.waitForFunction(() => window.record.events.some(({ type, plan }) => type === 'planned' && plan.depth === 'stereo'));
-  await page.getByText('Depth is estimated from the photos').waitFor();
+  await page.getByText('Depth is estimated from the photos, which takes longer').waitFor();
   await choose(visitor, { size: '160 × 120', keyframes: '30' });
   await page.click('#run');
   await visitor.within(300_000, 'finished');
