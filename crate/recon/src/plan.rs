@@ -17,8 +17,6 @@ const MARGIN: f64 = 0.8;
 const TRIANGLES_PER_BRICK: usize = 75;
 /// The weight that a surface of stereo needs: half of what a sensor's needs. Measured in ARCHITECTURE.md.
 const STEREO_LEAST_WEIGHT: f32 = 0.02;
-/// Pictures that stereo keeps at its working size.
-const STEREO_PICTURES: usize = 48;
 
 /// What the machine allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -221,6 +219,6 @@ fn stereo_bytes(scan: &Scan, keyframes: &[usize], config: &StereoConfig) -> Byte
     let working = working.max().unwrap_or(0);
     Bytes {
         device: 2 * working * config.planes * size_of::<f32>(),
-        heap: keyframes.len().min(STEREO_PICTURES) * working * 4 * size_of::<f32>(),
+        heap: keyframes.len().min(stereo::VIEWS_KEPT) * working * 4 * size_of::<f32>(),
     }
 }

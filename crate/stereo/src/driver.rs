@@ -16,7 +16,7 @@ use std::{
 };
 
 /// Pictures kept at the working size.
-const VIEWS_KEPT: usize = 48;
+pub const VIEWS_KEPT: usize = 48;
 /// Below this correlation with its neighbours a frame is not where its pose says.
 const LEAST_CORRELATION: f32 = 0.25;
 /// The first few keyframes give depth once this many of their sources are matched, the best first.

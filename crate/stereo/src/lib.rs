@@ -22,6 +22,6 @@ pub mod sweep;
 pub mod view;
 
 pub use config::StereoConfig;
-pub use driver::{DepthMap, Step, Stereo};
+pub use driver::{DepthMap, Step, Stereo, VIEWS_KEPT};
 pub use error::StereoError;
 pub use recipe::Recipe;
