@@ -1,0 +1,1 @@
+//! Voxels to surface: the sparse 3D network of a level.

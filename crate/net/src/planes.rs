@@ -1,0 +1,1 @@
+//! Pictures to feature planes: everything that is computed once a frame.

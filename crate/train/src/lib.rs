@@ -1,0 +1,1 @@
+//! Losses to weights: what the network learns from, and how.
