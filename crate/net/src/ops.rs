@@ -1,1 +1,6 @@
 //! Operations that burn does not have. Each is a trait of burn's backend extension with a plain body of tensor operations.
+
+pub mod affine;
+pub(crate) mod flex;
+pub mod linrec;
+pub mod upsample;

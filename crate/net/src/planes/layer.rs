@@ -1,0 +1,119 @@
+//! Layers that several parts of the planes share.
+
+use burn::module::{Module, Param};
+use burn::nn::conv::{Conv2d, Conv2dConfig};
+use burn::nn::{BatchNorm, BatchNormConfig, Initializer, PaddingConfig2d};
+use burn::tensor::{Device, Tensor, activation::relu};
+
+/// A linear layer of each pixel's channels, with bias, as a 1x1 convolution.
+pub(super) fn pointwise(channels_in: usize, channels_out: usize) -> Conv2dConfig {
+    Conv2dConfig::new([channels_in, channels_out], [1, 1])
+}
+
+/// A convolution without bias whose output pixel `i` is centred on input pixel `stride * i`; sides become
+/// `ceil(side / stride)`.
+pub(super) fn centred(channels: [usize; 2], kernel: usize, stride: usize) -> Conv2dConfig {
+    let pad = kernel / 2;
+    Conv2dConfig::new(channels, [kernel, kernel])
+        .with_stride([stride, stride])
+        .with_padding(PaddingConfig2d::Explicit(pad, pad, pad, pad))
+        .with_bias(false)
+}
+
+/// Kaiming-normal for a ReLU that follows, of the inputs or of the outputs.
+pub(super) fn kaiming(fan_out_only: bool) -> Initializer {
+    Initializer::KaimingNormal {
+        gain: std::f64::consts::SQRT_2,
+        fan_out_only,
+    }
+}
+
+/// A convolution without bias, its batch normalisation and, where asked, a ReLU.
+#[derive(Module, Debug)]
+pub struct ConvNorm {
+    /// The convolution.
+    pub conv: Conv2d,
+    /// Over views and pixels.
+    pub norm: BatchNorm,
+    relu: bool,
+}
+
+impl ConvNorm {
+    /// Dense, and initialised as torchvision's MnasNet.
+    pub(super) fn init(
+        channels: [usize; 2],
+        kernel: usize,
+        stride: usize,
+        relu: bool,
+        device: &Device,
+    ) -> Self {
+        Self {
+            conv: centred(channels, kernel, stride)
+                .with_initializer(kaiming(true))
+                .init(device),
+            norm: BatchNormConfig::new(channels[1]).init(device),
+            relu,
+        }
+    }
+
+    /// One kernel a channel; always with a ReLU.
+    pub(super) fn depthwise(
+        channels: usize,
+        kernel: usize,
+        stride: usize,
+        device: &Device,
+    ) -> Self {
+        Self {
+            conv: centred([channels, channels], kernel, stride)
+                .with_groups(channels)
+                .with_initializer(kaiming(true))
+                .init(device),
+            norm: BatchNormConfig::new(channels).init(device),
+            relu: true,
+        }
+    }
+
+    pub(super) fn forward(&self, x: Tensor<4>) -> Tensor<4> {
+        let x = self.norm.forward(self.conv.forward(x));
+        if self.relu { relu(x) } else { x }
+    }
+}
+
+/// Normalises the channels of each pixel: `gamma * (x - mean) / sqrt(variance + 1e-5) + beta`.
+#[derive(Module, Debug)]
+pub struct ChannelNorm {
+    /// Gain of each channel.
+    pub gamma: Param<Tensor<1>>,
+    /// Shift of each channel.
+    pub beta: Param<Tensor<1>>,
+}
+
+impl ChannelNorm {
+    pub(super) fn init(channels: usize, device: &Device) -> Self {
+        Self {
+            gamma: Initializer::Ones.init([channels], device),
+            beta: Initializer::Zeros.init([channels], device),
+        }
+    }
+
+    pub(super) fn forward(&self, x: Tensor<4>) -> Tensor<4> {
+        let centred = x.clone() - x.mean_dim(1);
+        let variance = centred.clone().square().mean_dim(1);
+        let scale = (variance + 1e-5).sqrt().recip();
+        centred * scale * of_channels(self.gamma.val()) + of_channels(self.beta.val())
+    }
+}
+
+/// A value a channel, to be broadcast over views and pixels.
+pub(super) fn of_channels(values: Tensor<1>) -> Tensor<4> {
+    let [channels] = values.dims();
+    values.reshape([1, channels, 1, 1])
+}
+
+/// Mean over the pixels: `[V, C, h, w]` to `[V, C]`.
+pub(super) fn pooled(x: Tensor<4>) -> Tensor<2> {
+    let [views, channels, height, width] = x.dims();
+    x.reshape([views, channels, height * width])
+        .mean_dim(2)
+        .reshape([views, channels])
+}

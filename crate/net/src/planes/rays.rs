@@ -1,0 +1,72 @@
+//! Viewing directions mixed into the features (method 1.2).
+
+use std::f32::consts::PI;
+
+use burn::module::Module;
+use burn::nn::Initializer;
+use burn::nn::conv::Conv2d;
+use burn::tensor::{Device, Tensor, TensorData};
+use glam::Vec2;
+
+use super::layer::pointwise;
+use crate::{Level, View};
+
+/// Octaves of the encoding.
+const OCTAVES: i32 = 4;
+/// Channels of an encoded direction: itself, then sine and cosine of three coordinates in each octave.
+pub const CHANNELS: usize = 3 + 2 * 3 * OCTAVES as usize;
+
+/// `[F, gamma(d)] -> F`: a 1x1 convolution without bias.
+#[derive(Module, Debug)]
+pub struct RayEncoding {
+    mix: Conv2d,
+}
+
+impl RayEncoding {
+    /// Xavier-normal.
+    pub fn init(channels: usize, device: &Device) -> Self {
+        Self {
+            mix: pointwise(channels + CHANNELS, channels)
+                .with_bias(false)
+                .with_initializer(Initializer::XavierNormal { gain: 1.0 })
+                .init(device),
+        }
+    }
+
+    /// Features `[V, C, h, w]` of a level, seen by `views`.
+    pub fn forward(&self, features: Tensor<4>, views: &[View], level: Level) -> Tensor<4> {
+        let [_, _, height, width] = features.dims();
+        let encoded = encoded(views, width, height, level.stride());
+        let shape = [views.len(), CHANNELS, height, width];
+        let encoded = Tensor::from_data(TensorData::new(encoded, shape), &features.device());
+        self.mix.forward(Tensor::cat(vec![features, encoded], 1))
+    }
+}
+
+/// `gamma(d) = [d, sin(2^l pi d), cos(2^l pi d)]` for octaves `l` = 0 to 3, of the unit ray `d` in world coordinates through
+/// each pixel of a plane: `[V, 27, height, width]`, row by row. In channels: x, y, z; then for each octave the sines of x, y,
+/// z, then their cosines. Plane pixel `i` is picture pixel `stride * i`.
+pub fn encoded(views: &[View], width: usize, height: usize, stride: usize) -> Vec<f32> {
+    let pixels = width * height;
+    let mut all = vec![0.0; views.len() * CHANNELS * pixels];
+    for (view, of_view) in views.iter().zip(all.chunks_exact_mut(CHANNELS * pixels)) {
+        for pixel in 0..pixels {
+            let at = Vec2::new((pixel % width) as f32, (pixel / width) as f32) * stride as f32;
+            let ray = view
+                .world_from_camera
+                .transform_vector3(view.camera.ray(at))
+                .normalize()
+                .to_array();
+            for (axis, d) in ray.into_iter().enumerate() {
+                of_view[axis * pixels + pixel] = d;
+                for octave in 0..OCTAVES {
+                    let (sine, cosine) = (2.0_f32.powi(octave) * PI * d).sin_cos();
+                    let channel = 3 + 6 * octave as usize + axis;
+                    of_view[channel * pixels + pixel] = sine;
+                    of_view[(channel + 3) * pixels + pixel] = cosine;
+                }
+            }
+        }
+    }
+    all
+}
