@@ -80,6 +80,22 @@ pub enum Failure {
         /// What is wrong with it.
         error: Box<mesh::ply::PlyError>,
     },
+    /// A picture that cannot be compressed.
+    #[error("{}: the picture could not be written: {error}; check the size that --size gives", path.display())]
+    Picture {
+        /// Which file.
+        path: PathBuf,
+        /// What is wrong with it.
+        error: String,
+    },
+    /// Threads that the system refuses to start.
+    #[error("expected to start {wanted} threads: {error}; ask for fewer with --threads")]
+    Threads {
+        /// How many were asked for.
+        wanted: usize,
+        /// What the system says.
+        error: String,
+    },
     /// The result cannot be put into words for programs.
     #[error("the report could not be written as JSON: {0}")]
     Json(#[from] serde_json::Error),

@@ -10,6 +10,7 @@ mod fuse;
 mod job;
 mod progress;
 mod stereo;
+mod synth;
 
 use clap::{Parser, Subcommand};
 use failure::Failure;
@@ -33,6 +34,8 @@ enum Command {
     Eval(eval::Arguments),
     /// Look into a scan and say what is wrong with it.
     Doctor(doctor::Arguments),
+    /// Make scans of made-up rooms, with exact depth, to learn from.
+    Synth(synth::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -41,6 +44,7 @@ fn main() -> ExitCode {
         Command::Stereo(arguments) => stereo::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
+        Command::Synth(arguments) => synth::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

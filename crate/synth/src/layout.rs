@@ -83,6 +83,15 @@ fn seven_scenes(views: &[View], poses: &[Pose]) -> Files {
     files
 }
 
+/// The 7-Scenes layout in the room's own world, Z up.
+pub(crate) fn seven_scenes_upright(views: &[View]) -> Vec<(String, Content)> {
+    let poses: Vec<_> = views
+        .iter()
+        .map(|view| (view.rotation, view.position_m))
+        .collect();
+    seven_scenes(views, &poses)
+}
+
 fn scannet(views: &[View], poses: &[Pose]) -> Files {
     let mut files = Files::new();
     if let Some(view) = views.first() {

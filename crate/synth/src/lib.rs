@@ -19,9 +19,11 @@ mod surface;
 mod texture;
 mod things;
 mod trace;
+mod training;
 
 pub use layout::Layout;
 pub use path::{CLEARANCE_M, View, path};
 pub use room::Room;
 pub use sample::SampleScan;
 pub use trace::{Frame, depth, render};
+pub use training::TrainingScan;
