@@ -7,6 +7,7 @@
 pub mod config;
 pub mod decode;
 pub mod fusion;
+pub mod guide;
 pub mod named;
 pub mod ops;
 pub mod planes;

@@ -1,6 +1,6 @@
 //! Flex tensors as slices.
 
-use std::ops::Deref;
+use std::ops::{Deref, Range};
 
 use burn::tensor::{Bytes, DType, Shape};
 use burn_flex::{FlexTensor, Layout};
@@ -28,4 +28,36 @@ pub(crate) fn tensor(numbers: Vec<f32>, shape: Shape) -> FlexTensor {
         Layout::contiguous(shape),
         DType::F32,
     )
+}
+
+/// Ranges of segments with about `rows` rows each; segment `n` has rows `offsets[n]..offsets[n + 1]`. They depend on the
+/// segments alone, not on the number of threads: sums over parts come out alike everywhere.
+pub(crate) fn parts(offsets: &[i32], rows: usize) -> Vec<Range<usize>> {
+    let count = offsets.len().saturating_sub(1);
+    let mut parts = Vec::new();
+    let mut start = 0;
+    for segment in 0..count {
+        if (offsets[segment + 1] - offsets[start]) as usize >= rows || segment + 1 == count {
+            parts.push(start..segment + 1);
+            start = segment + 1;
+        }
+    }
+    parts
+}
+
+/// The rows of each part, `width` numbers a row.
+pub(crate) fn split_rows<'a>(
+    mut table: &'a mut [f32],
+    offsets: &[i32],
+    parts: &[Range<usize>],
+    width: usize,
+) -> Vec<&'a mut [f32]> {
+    let mut split = Vec::with_capacity(parts.len());
+    for part in parts {
+        let rows = (offsets[part.end] - offsets[part.start]) as usize;
+        let (here, rest) = table.split_at_mut(rows * width);
+        split.push(here);
+        table = rest;
+    }
+    split
 }

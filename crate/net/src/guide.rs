@@ -1,0 +1,66 @@
+//! Stereo's depth as the 3D network is given it: the switch `guide`.
+
+use glam::{IVec3, Vec3};
+use rayon::prelude::*;
+
+use crate::sample::GuideMap;
+
+/// Voxels of truncation, as in the truth (method 1.8).
+const TRUNCATION: f32 = 3.0;
+
+/// For each site the mean of `clamp((depth - z) / truncation, -1, 1)` over the maps that see it in front of their surface or
+/// at most one truncation (three voxels) behind, weighed by their confidence, and that weight cut at 1. Zeros where no map
+/// says anything.
+pub fn guide_channels(
+    sites: &[IVec3],
+    voxel_size_m: f32,
+    origin_m: Vec3,
+    maps: &[GuideMap],
+) -> Vec<[f32; 2]> {
+    let truncation = TRUNCATION * voxel_size_m;
+    let cameras: Vec<_> = maps
+        .iter()
+        .map(|map| (map, map.view.world_from_camera.inverse()))
+        .collect();
+    sites
+        .par_iter()
+        .with_min_len(256)
+        .map(|site| {
+            let world = site.as_vec3() * voxel_size_m + origin_m;
+            let [mut sum, mut weight] = [0.0; 2];
+            for (map, camera_from_world) in &cameras {
+                let point = camera_from_world.transform_point3(world);
+                let Some((depth, confidence)) = look_up(map, point) else {
+                    continue;
+                };
+                let distance = (depth - point.z) / truncation;
+                if distance >= -1.0 {
+                    sum += confidence * distance.min(1.0);
+                    weight += confidence;
+                }
+            }
+            if weight > 0.0 {
+                [sum / weight, weight.min(1.0)]
+            } else {
+                [0.0; 2]
+            }
+        })
+        .collect()
+}
+
+/// Depth and confidence at the pixel nearest to a point of the camera, where there are such.
+fn look_up(map: &GuideMap, point: Vec3) -> Option<(f32, f32)> {
+    if point.z <= 0.0 {
+        return None;
+    }
+    let camera = &map.view.camera;
+    let pixel = camera.project(point).round();
+    let inside = pixel.x >= 0.0
+        && pixel.y >= 0.0
+        && pixel.x < camera.width as f32
+        && pixel.y < camera.height as f32;
+    let at = inside.then_some(pixel.x as usize + camera.width as usize * pixel.y as usize)?;
+    let depth = *map.depth_m.get(at)?;
+    let confidence = *map.confidence.get(at)?;
+    (depth > 0.0 && confidence > 0.0).then_some((depth, confidence))
+}
