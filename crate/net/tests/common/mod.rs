@@ -1,6 +1,9 @@
 //! Numbers that Rust and the Python reference make alike, so that golden files hold results only.
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used)]
 
+#[macro_use]
+pub mod devices;
+
 /// `count` numbers in [-scale, scale) that `name` decides: FNV-1a of the name, then SplitMix64 of that plus the index.
 /// The same as `numbers` in tests/reference/made_numbers.py.
 pub fn numbers(name: &str, count: usize, scale: f32) -> Vec<f32> {
@@ -22,18 +25,21 @@ pub fn numbers(name: &str, count: usize, scale: f32) -> Vec<f32> {
 /// A module whose every tensor is made by [`numbers`] from its path: weights of `fan_in` inputs within
 /// `sqrt(3 / fan_in)`, vectors within 0.5, and the variances of normalisation between 0.5 and 1.5.
 pub fn filled<M: burn::module::Module>(module: M) -> M {
-    net::named::replace(module, |path, shape| {
-        let count = shape.iter().product();
-        Some(match shape.len() {
-            1 if path.ends_with("running_var") => {
-                numbers(path, count, 0.5).iter().map(|v| v + 1.0).collect()
-            }
-            1 => numbers(path, count, 0.5),
-            // Of a convolution all but the first axis feed an output; of a linear layer the first does.
-            2 => numbers(path, count, (3.0 / shape[0] as f32).sqrt()),
-            _ => numbers(path, count, (3.0 / (count / shape[0]) as f32).sqrt()),
-        })
-    })
+    net::named::replace(module, |path, shape| Some(made_weight(path, shape)))
+}
+
+/// The tensor that [`filled`] puts at `path`.
+pub fn made_weight(path: &str, shape: &[usize]) -> Vec<f32> {
+    let count = shape.iter().product();
+    match shape.len() {
+        1 if path.ends_with("running_var") => {
+            numbers(path, count, 0.5).iter().map(|v| v + 1.0).collect()
+        }
+        1 => numbers(path, count, 0.5),
+        // Of a convolution all but the first axis feed an output; of a linear layer the first does.
+        2 => numbers(path, count, (3.0 / shape[0] as f32).sqrt()),
+        _ => numbers(path, count, (3.0 / (count / shape[0]) as f32).sqrt()),
+    }
 }
 
 /// The largest absolute difference over the largest absolute value expected.
