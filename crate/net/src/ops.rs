@@ -7,4 +7,5 @@ pub mod linrec;
 pub mod pool;
 pub mod rows;
 pub mod segments;
+pub mod sparse_conv;
 pub mod upsample;
