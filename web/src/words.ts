@@ -6,12 +6,23 @@ const STAGES: Record<StageName, string> = {
   warmingUp: "Warming up",
   matching: "Matching views",
   fusing: "Fusing depth",
+  features: "Looking at the pictures",
+  coarse: "Finding the room",
+  medium: "Finding surfaces",
+  fine: "Shaping surfaces",
+  coloring: "Colouring",
   meshing: "Finishing the mesh",
+};
+
+const WORK: Record<DepthSource, readonly StageName[]> = {
+  sensor: ["fusing"],
+  stereo: ["matching"],
+  network: ["features", "coarse", "medium", "fine", "coloring"],
 };
 
 /** The stages in the order in which they come. */
 export function stageOrder(depth: DepthSource = "sensor"): readonly StageName[] {
-  return ["opening", "warmingUp", depth === "stereo" ? "matching" : "fusing", "meshing"];
+  return ["opening", "warmingUp", ...WORK[depth], "meshing"];
 }
 
 /** A stage in words. */

@@ -4,7 +4,7 @@ use crate::messages::{
     DepthSource, FindingMessage, InputEvent, PixelSize, PlanSummary, RunOptions, ShadingMode,
     StageName, ViewOptions,
 };
-use recon::{Options, Plan, Stage};
+use recon::{Level, NetworkConfig, Options, Plan, Stage};
 use scan::{Finding, Gravity, GravitySource};
 use stereo::StereoConfig;
 use view::{Input, Look, PointerKind, Shading, Theme};
@@ -21,6 +21,7 @@ pub fn options(message: RunOptions) -> Options {
                 size: (message.stereo_size.width_px, message.stereo_size.height_px),
                 ..StereoConfig::default()
             }),
+            DepthSource::Network => recon::DepthSource::Network(NetworkConfig::default()),
         }),
     }
 }
@@ -29,8 +30,8 @@ pub fn options(message: RunOptions) -> Options {
 pub fn run_options(plan: &Plan) -> RunOptions {
     let options = &plan.options;
     let (width_px, height_px) = match plan.depth {
-        recon::DepthSource::Sensor => StereoConfig::default().size,
         recon::DepthSource::Stereo(config) => config.size,
+        recon::DepthSource::Sensor | recon::DepthSource::Network(_) => StereoConfig::default().size,
     };
     RunOptions {
         voxel_size_m: options.voxel_size_m,
@@ -49,6 +50,7 @@ fn depth_source(source: recon::DepthSource) -> DepthSource {
     match source {
         recon::DepthSource::Sensor => DepthSource::Sensor,
         recon::DepthSource::Stereo(_) => DepthSource::Stereo,
+        recon::DepthSource::Network(_) => DepthSource::Network,
     }
 }
 
@@ -70,6 +72,11 @@ pub fn stage_name(stage: Stage) -> StageName {
         Stage::WarmingUp => StageName::WarmingUp,
         Stage::Matching => StageName::Matching,
         Stage::Fusing => StageName::Fusing,
+        Stage::Features => StageName::Features,
+        Stage::Decoding(Level::Coarse) => StageName::Coarse,
+        Stage::Decoding(Level::Medium) => StageName::Medium,
+        Stage::Decoding(Level::Fine) => StageName::Fine,
+        Stage::Coloring => StageName::Coloring,
         Stage::Meshing => StageName::Meshing,
     }
 }

@@ -140,7 +140,7 @@ pub fn plan(engine: &Rc<Engine>, options: Options) -> bool {
                 world_from_camera: recon::pose(frame),
                 pinhole: recon::pinhole(match plan.depth {
                     DepthSource::Sensor => &frame.depth_camera,
-                    DepthSource::Stereo(_) => &frame.color_camera,
+                    DepthSource::Stereo(_) | DepthSource::Network(_) => &frame.color_camera,
                 }),
             });
             engine.set_cameras(&poses.collect::<Vec<_>>());

@@ -127,6 +127,9 @@ pub enum DepthSource {
     Sensor,
     /// The colour pictures and their poses: what one sees is looked for in its neighbours.
     Stereo,
+    /// The colour pictures and their poses, by a trained network. It needs weights, which the engine cannot be given yet:
+    /// a run with it fails and says so.
+    Network,
 }
 
 /// Width and height.
@@ -296,6 +299,16 @@ pub enum StageName {
     Matching,
     /// The sensor's depth becomes a volume; counted in keyframes.
     Fusing,
+    /// Pictures become the network's feature planes; counted in keyframes.
+    Features,
+    /// The network makes voxels of 16 cm; counted in blocks of them.
+    Coarse,
+    /// The network makes voxels of 8 cm; counted in blocks of them.
+    Medium,
+    /// The network makes voxels of 4 cm; counted in blocks of them.
+    Fine,
+    /// The network's surface gets its colours; counted in keyframes.
+    Coloring,
     /// The last bricks of the mesh are made.
     Meshing,
 }

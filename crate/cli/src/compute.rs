@@ -12,8 +12,10 @@ const CPU_BINDING_BYTES: usize = 2 << 30;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum DeviceChoice {
     /// The processor, on all cores.
+    #[value(alias = "flex")]
     Cpu,
     /// The graphics card, through Vulkan, Metal or DirectX.
+    #[value(alias = "wgpu")]
     Gpu,
 }
 

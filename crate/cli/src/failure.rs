@@ -38,6 +38,14 @@ pub enum Failure {
         /// Name of the scan.
         name: String,
     },
+    /// The run went well, and there is no surface.
+    #[error(
+        "expected a surface, found none from {keyframes} keyframes, and no mesh is written; `ipdrecon doctor` looks into the scan for what may be wrong"
+    )]
+    NoSurface {
+        /// Keyframes used.
+        keyframes: usize,
+    },
     /// The run cannot be planned.
     #[error(transparent)]
     Plan(#[from] recon::PlanError),

@@ -1,6 +1,6 @@
 //! `ipdrecon fuse`: the depth images of a scan to a mesh.
 
-use crate::{failure::Failure, job::Job};
+use crate::{failure::Failure, job::DepthJob};
 use clap::Args;
 use recon::DepthSource;
 
@@ -8,7 +8,7 @@ use recon::DepthSource;
 #[derive(Args)]
 pub struct Arguments {
     #[command(flatten)]
-    job: Job,
+    job: DepthJob,
 }
 
 /// Runs `fuse`.

@@ -1,4 +1,4 @@
-//! From a scan to a mesh file: what `fuse` and `stereo` share. They differ in where depth comes from.
+//! From a scan to a mesh file: what `fuse`, `stereo` and `reconstruct` share. They differ in where the surface comes from.
 
 use crate::{
     compute::DeviceChoice,
@@ -7,14 +7,16 @@ use crate::{
     files::{MeshFormat, open_scan},
     progress::{Terminal, print_finding},
 };
+use burn::tensor::Device;
 use clap::Args;
-use recon::{DepthSource, Options, Plan, PlanError};
+use recon::{DepthSource, Limits, Options, Outcome, Plan, PlanError};
+use scan::Scan;
 use std::{
     path::{Path, PathBuf},
     time::Instant,
 };
 
-/// What both are told.
+/// What all are told.
 #[derive(Args)]
 pub struct Job {
     /// Folder or zip of the scan: 7-Scenes, ScanNet (exported) or TUM RGB-D.
@@ -22,18 +24,9 @@ pub struct Job {
     /// The mesh to write: .ply, .glb or .obj.
     #[arg(short, long)]
     output: PathBuf,
-    /// Edge of a voxel in metres.
-    #[arg(long, default_value_t = Options::default().voxel_size_m)]
-    voxel: f32,
     /// Take every n-th keyframe.
     #[arg(long, default_value_t = Options::default().every)]
     every: usize,
-    /// Take at most this many keyframes, evenly spread.
-    #[arg(long)]
-    views: Option<usize>,
-    /// Depth beyond this many metres is not used.
-    #[arg(long, default_value_t = Options::default().max_depth_m)]
-    max_depth: f32,
     /// Keep the canonical frame (Z up) instead of the scan's own.
     #[arg(long)]
     canonical: bool,
@@ -42,43 +35,106 @@ pub struct Job {
     device: DeviceChoice,
 }
 
-impl Job {
+/// What those are told that fuse depth.
+#[derive(Args)]
+pub struct DepthJob {
+    #[command(flatten)]
+    job: Job,
+    /// Edge of a voxel in metres.
+    #[arg(long, default_value_t = Options::default().voxel_size_m)]
+    voxel: f32,
+    /// Take at most this many keyframes, evenly spread.
+    #[arg(long)]
+    views: Option<usize>,
+    /// Depth beyond this many metres is not used.
+    #[arg(long, default_value_t = Options::default().max_depth_m)]
+    max_depth: f32,
+}
+
+impl DepthJob {
     /// Makes the mesh and writes it; the depth maps of stereo too, where `maps` names a folder.
     pub fn run(&self, depth: DepthSource, maps: Option<&Path>) -> Result<(), Failure> {
+        let opened = self.job.open()?;
+        let plan = opened.plan(Options {
+            voxel_size_m: self.voxel,
+            views: self.views,
+            max_depth_m: self.max_depth,
+            ..self.job.options(depth)
+        })?;
+        let maps = maps.map(|folder| DepthFolder::create(folder, &opened.scan));
+        let mut terminal = Terminal::new(maps.transpose()?);
+        let Opened { scan, device, .. } = &opened;
+        let outcome = pollster::block_on(recon::run(scan, &plan, device, &mut terminal));
+        terminal.finish()?;
+        self.job.write(&opened, &outcome?)
+    }
+}
+
+/// A scan and a device at hand.
+pub struct Opened {
+    /// The scan; what was noticed about it is told.
+    pub scan: Scan,
+    /// Where to compute.
+    pub device: Device,
+    limits: Limits,
+    format: MeshFormat,
+    started: Instant,
+}
+
+impl Job {
+    /// Opens the scan and the device, and tells a wrong name of the output before any work.
+    pub fn open(&self) -> Result<Opened, Failure> {
         let started = Instant::now();
         let format = MeshFormat::of(&self.output)?;
         let scan = open_scan(&self.scan)?;
         scan.findings().iter().for_each(print_finding);
         let (device, limits) = self.device.device()?;
-        let plan = recon::plan(&scan, &limits, self.options(depth)).map_err(planning_failed)?;
-        print_plan(&plan);
-        let maps = maps.map(|folder| DepthFolder::create(folder, &scan));
-        let mut terminal = Terminal::new(maps.transpose()?);
-        let outcome = pollster::block_on(recon::run(&scan, &plan, &device, &mut terminal));
-        terminal.finish()?;
-        let outcome = outcome?;
+        Ok(Opened {
+            scan,
+            device,
+            limits,
+            format,
+            started,
+        })
+    }
+
+    /// What is asked for, with the usual for everything that is not in a [`Job`].
+    pub fn options(&self, depth: DepthSource) -> Options {
+        Options {
+            every: self.every,
+            depth: Some(depth),
+            ..Options::default()
+        }
+    }
+
+    /// Takes the mesh from the volume and writes it, unless there is none.
+    pub fn write(&self, opened: &Opened, outcome: &Outcome) -> Result<(), Failure> {
         let mut mesh = pollster::block_on(outcome.volume.mesh())?;
-        let up = recon::place(&mut mesh, &scan, self.canonical);
-        format.write(&mesh, up, &self.output)?;
+        if mesh.triangles.is_empty() {
+            return Err(Failure::NoSurface {
+                keyframes: outcome.frames_fused,
+            });
+        }
+        let up = recon::place(&mut mesh, &opened.scan, self.canonical);
+        opened.format.write(&mesh, up, &self.output)?;
         eprintln!(
             "{}: {} vertices, {} triangles from {} keyframes in {:.1} s",
             self.output.display(),
             mesh.positions.len(),
             mesh.triangles.len(),
             outcome.frames_fused,
-            started.elapsed().as_secs_f64(),
+            opened.started.elapsed().as_secs_f64(),
         );
         Ok(())
     }
+}
 
-    fn options(&self, depth: DepthSource) -> Options {
-        Options {
-            voxel_size_m: self.voxel,
-            every: self.every,
-            views: self.views,
-            max_depth_m: self.max_depth,
-            depth: Some(depth),
-        }
+impl Opened {
+    /// Plans, and prints what was planned.
+    pub fn plan(&self, options: Options) -> Result<Plan, Failure> {
+        let plan = recon::plan(&self.scan, &self.limits, options).map_err(planning_failed)?;
+        print_plan(&plan);
+        Ok(plan)
     }
 }
 

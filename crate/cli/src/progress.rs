@@ -2,7 +2,7 @@
 
 use crate::{depth_folder::DepthFolder, failure::Failure};
 use indicatif::{ProgressBar, ProgressStyle};
-use recon::{Flow, Sink, Stage};
+use recon::{Flow, Level, Sink, Stage};
 use scan::{Finding, Severity};
 use stereo::DepthMap;
 
@@ -49,6 +49,11 @@ impl Sink for Terminal {
             Stage::WarmingUp => "warming up",
             Stage::Matching => "matching",
             Stage::Fusing => "fusing",
+            Stage::Features => "features",
+            Stage::Decoding(Level::Coarse) => "16 cm voxels",
+            Stage::Decoding(Level::Medium) => "8 cm voxels",
+            Stage::Decoding(Level::Fine) => "4 cm voxels",
+            Stage::Coloring => "colouring",
             Stage::Meshing => "meshing",
         };
         self.bar = bar(label, total);

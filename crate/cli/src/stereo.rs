@@ -1,6 +1,6 @@
 //! `ipdrecon stereo`: the colour images of a scan to depth, and that to a mesh.
 
-use crate::{failure::Failure, job::Job};
+use crate::{failure::Failure, job::DepthJob};
 use clap::Args;
 use recon::DepthSource;
 use std::{fmt, path::PathBuf, str::FromStr};
@@ -10,7 +10,7 @@ use stereo::StereoConfig;
 #[derive(Args)]
 pub struct Arguments {
     #[command(flatten)]
-    job: Job,
+    job: DepthJob,
     /// Pictures are scaled down to fit into this many pixels.
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value_t = Size(StereoConfig::default().size))]
     size: Size,

@@ -1,11 +1,13 @@
 //! What a run tells while it goes on, and how it is told to wait or to stop.
 
 use glam::Vec3;
+use net::Level;
 use scan::Finding;
 use stereo::DepthMap;
 use volume::{BrickMeshes, VolumeError};
 
-/// The stages of a run, in order; a run has either [`Stage::Matching`] or [`Stage::Fusing`].
+/// The stages of a run, in order. Between warming up and meshing a run has either [`Stage::Matching`], or [`Stage::Fusing`],
+/// or the network's: [`Stage::Features`], [`Stage::Decoding`] of each level, [`Stage::Coloring`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stage {
     /// Kernels are compiled.
@@ -14,6 +16,12 @@ pub enum Stage {
     Matching,
     /// The sensor's depth becomes a volume; counted in keyframes.
     Fusing,
+    /// Pictures become the network's feature planes; counted in keyframes.
+    Features,
+    /// The network makes voxels of a level; counted in blocks of voxels that views are fused at, and one for its 3D network.
+    Decoding(Level),
+    /// The network's surface gets its colours; counted in keyframes.
+    Coloring,
     /// The last bricks of the mesh are made; counted in bricks.
     Meshing,
 }

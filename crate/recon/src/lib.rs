@@ -9,5 +9,8 @@ mod run;
 
 pub use convert::{pinhole, place, pose};
 pub use event::{Flow, Sink, Stage};
-pub use plan::{DepthSource, Limits, Options, Plan, PlanError, plan};
-pub use run::{Outcome, RunError, run};
+pub use net::Level;
+pub use plan::{
+    DepthSource, Limits, NetworkConfig, Options, Plan, PlanError, Preset, ViewChoice, plan,
+};
+pub use run::{Decoded, Network, Outcome, RunError, reconstruct, run};

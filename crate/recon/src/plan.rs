@@ -1,9 +1,12 @@
 //! What fits, said before any work: frames, bricks, bytes, and what was turned down and why.
 
 mod bricks;
+mod network;
 mod options;
 
 use bricks::Foresight;
+pub(crate) use network::NETWORK_VOXEL_M;
+pub use network::{NetworkConfig, Preset, ViewChoice};
 pub use options::{DepthSource, Options};
 use scan::{Camera, Frame, KeyframeRule, Scan, keyframes};
 use stereo::{StereoConfig, StereoError};
@@ -104,13 +107,13 @@ pub fn plan(scan: &Scan, limits: &Limits, options: Options) -> Result<Plan, Plan
     let frames = scan.frames();
     let usable = |frame: &usize| match depth {
         DepthSource::Sensor => frames[*frame].depth.is_some(),
-        DepthSource::Stereo(_) => frames[*frame].color.is_some(),
+        DepthSource::Stereo(_) | DepthSource::Network(_) => frames[*frame].color.is_some(),
     };
     let kept = keyframes(frames, KeyframeRule::default());
     let keyframes = options.chosen(kept.into_iter().filter(usable));
     let foresight = match depth {
         DepthSource::Sensor => Foresight::from_depth(scan, &keyframes),
-        DepthSource::Stereo(_) if keyframes.len() < 2 => {
+        DepthSource::Stereo(_) | DepthSource::Network(_) if keyframes.len() < 2 => {
             return Err(PlanError::TooFewPictures {
                 name: scan.name().to_owned(),
                 found: keyframes.len(),
@@ -120,8 +123,19 @@ pub fn plan(scan: &Scan, limits: &Limits, options: Options) -> Result<Plan, Plan
             let far_m = config.far_m.min(options.max_depth_m);
             Foresight::from_cameras(scan, &keyframes, f64::from(far_m))
         }
+        DepthSource::Network(config) => {
+            Foresight::from_cameras(scan, &keyframes, f64::from(config.reach_m))
+        }
     };
 
+    let mut remarks = Vec::new();
+    let wanted_m = match &depth {
+        DepthSource::Network(config) => {
+            remarks.extend(network_remarks(config, &options, keyframes.len()));
+            NETWORK_VOXEL_M
+        }
+        _ => options.voxel_size_m,
+    };
     let laid_out = |voxel_size_m: f32| {
         let volume = VolumeConfig {
             max_depth_m: options.max_depth_m,
@@ -135,17 +149,24 @@ pub fn plan(scan: &Scan, limits: &Limits, options: Options) -> Result<Plan, Plan
     let fits = |(volume, bricks): &(VolumeConfig, usize)| {
         (*bricks as f64) < volume.brick_limit() as f64 * MARGIN
     };
-    let asked = laid_out(options.voxel_size_m);
+    let asked = laid_out(wanted_m);
     let mut chosen = asked;
-    while !fits(&chosen) {
-        chosen = laid_out(chosen.0.voxel_size_m * COARSER);
+    if matches!(depth, DepthSource::Network(_)) && !fits(&asked) {
+        remarks.push(format!(
+            "about {} bricks may be needed, and this device holds {}: if they do not fit, take fewer keyframes or a smaller reach",
+            asked.1,
+            asked.0.brick_limit(),
+        ));
+    } else {
+        while !fits(&chosen) {
+            chosen = laid_out(chosen.0.voxel_size_m * COARSER);
+        }
     }
     let (volume, bricks) = chosen;
-    let mut remarks = Vec::new();
     if volume != asked.0 {
         remarks.push(format!(
             "voxels of {:.1} cm would need about {} bricks, more than this device surely holds (of {}): voxels of {:.1} cm are used",
-            options.voxel_size_m * 100.0,
+            wanted_m * 100.0,
             asked.1,
             volume.brick_limit(),
             volume.voxel_size_m * 100.0,
@@ -157,18 +178,19 @@ pub fn plan(scan: &Scan, limits: &Limits, options: Options) -> Result<Plan, Plan
     };
     let fusion = 2 * bricks * BYTES_PER_BRICK
         + bricks * TRIANGLES_PER_BRICK * 3 * mesh::soup::VERTEX_STRIDE_BYTES as usize;
-    let stereo = match &depth {
+    let working = match &depth {
         DepthSource::Sensor => Bytes::default(),
         DepthSource::Stereo(config) => stereo_bytes(scan, &keyframes, config),
+        DepthSource::Network(config) => network_bytes(&keyframes, config, bricks),
     };
     let pictures = keyframes.iter().map(|&f| picture_bytes(&frames[f], &depth));
     Ok(Plan {
         options,
         depth,
         frames: frames.len(),
-        device_bytes: fusion + stereo.device,
+        device_bytes: fusion + working.device,
         // The file, its pixels, and the copy on its way to the device.
-        heap_bytes: 3 * pictures.max().unwrap_or(0) + stereo.heap,
+        heap_bytes: 3 * pictures.max().unwrap_or(0) + working.heap,
         keyframes,
         bricks,
         remarks,
@@ -181,6 +203,8 @@ fn surface_rule(depth: &DepthSource) -> SurfaceRule {
     let sensor = VolumeConfig::new(0.04).surface;
     match depth {
         DepthSource::Sensor => sensor,
+        // A distance that the network gives is known or it is not.
+        DepthSource::Network(_) => SurfaceRule::ANY,
         // Two sources agreed to every depth of stereo already, and its weights are below 1.
         DepthSource::Stereo(_) => SurfaceRule {
             least_weight: STEREO_LEAST_WEIGHT,
@@ -198,8 +222,27 @@ fn picture_bytes(frame: &Frame, depth: &DepthSource) -> usize {
     let color = color.map_or(0, |_| pixels(&frame.color_camera) * 7);
     match depth {
         DepthSource::Sensor => color + pixels(&frame.depth_camera) * 4,
-        DepthSource::Stereo(_) => color,
+        DepthSource::Stereo(_) | DepthSource::Network(_) => color,
     }
+}
+
+/// What of the wishes the network cannot grant.
+fn network_remarks(config: &NetworkConfig, options: &Options, keyframes: usize) -> Vec<String> {
+    let mut remarks = Vec::new();
+    if keyframes < config.views_a_tile {
+        remarks.push(format!(
+            "{} views were asked for, the scan has {keyframes} keyframes: all of them are used",
+            config.views_a_tile
+        ));
+    }
+    if options.voxel_size_m != NETWORK_VOXEL_M {
+        remarks.push(format!(
+            "the network is made for voxels of {:.1} cm, which are used instead of {:.1} cm",
+            NETWORK_VOXEL_M * 100.0,
+            options.voxel_size_m * 100.0
+        ));
+    }
+    remarks
 }
 
 #[derive(Default)]
@@ -220,5 +263,26 @@ fn stereo_bytes(scan: &Scan, keyframes: &[usize], config: &StereoConfig) -> Byte
     Bytes {
         device: 2 * working * config.planes * size_of::<f32>(),
         heap: keyframes.len().min(stereo::VIEWS_KEPT) * working * 4 * size_of::<f32>(),
+    }
+}
+
+/// What the network works on, no more than: every keyframe's feature planes at the full widths, and of the finest lattice
+/// what goes into and through the first layers of its 3D network.
+fn network_bytes(keyframes: &[usize], config: &NetworkConfig, bricks: usize) -> Bytes {
+    let pixels = config.size.0 as usize * config.size.1 as usize;
+    let widest = net::NetConfig::full();
+    let strides = net::Level::ALL.map(net::Level::stride);
+    let planes = widest.planes.iter().zip(strides);
+    let planes: usize = planes
+        .map(|(width, stride)| width * pixels / (stride * stride))
+        .sum();
+    // Base network and its second plane where there is one.
+    let planes = 2 * planes * size_of::<f32>() * keyframes.len();
+    let input = 3 * widest.unet[1] + widest.planes[2] + 1;
+    let through = 2 * (3 * widest.unet[2]);
+    let sites = bricks * volume::BRICK_VOXELS;
+    Bytes {
+        device: planes + sites * (input + through) * size_of::<f32>(),
+        heap: 0,
     }
 }

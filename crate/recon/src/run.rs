@@ -1,6 +1,7 @@
 //! The run: keyframe by keyframe into the volume, and brick by brick out of it. Each source of depth has a file of its
 //! own; what they share is here.
 
+mod neural;
 mod sensor;
 mod stereo;
 
@@ -12,6 +13,7 @@ use ::stereo::StereoError;
 use burn::tensor::Device;
 use glam::{Affine3A, Vec3};
 use mesh::camera::Pinhole;
+pub use neural::{Decoded, Network};
 use scan::{ColorImage, Scan};
 use volume::{DepthView, Volume, VolumeError};
 
@@ -29,13 +31,56 @@ pub enum RunError {
     /// Stereo failed.
     #[error(transparent)]
     Stereo(#[from] StereoError),
-    /// Not one depth image could be used or made.
+    /// Too few pictures could be used.
     #[error(
-        "expected depth in {keyframes} keyframes, found none that can be used; the findings say what is wrong with each"
+        "expected depth or colour in {keyframes} keyframes, found none or too little that can be used; the findings say what is wrong with each"
     )]
     NothingFused {
         /// Keyframes tried.
         keyframes: usize,
+    },
+    /// A plan for the network was run without one.
+    #[error(
+        "expected the weights of a network, found none; give trained weights, or make depth by stereo, which needs none"
+    )]
+    NoWeights,
+    /// No two keyframes see the same.
+    #[error(
+        "expected keyframes that see the same places, found none among {keyframes}, whose cameras move within {cameras}; \
+         check that poses are in metres and lead from camera to world, and that the pictures overlap by a half or more"
+    )]
+    NoOverlap {
+        /// Keyframes looked at.
+        keyframes: usize,
+        /// The space in which the cameras move, in words.
+        cameras: String,
+    },
+    /// The network found no surface.
+    #[error(
+        "expected surfaces near some of {sites} voxels of {voxel_cm} cm, found none in what {keyframes} keyframes show; check the scale: the \
+         cameras move within {cameras}, in a room that is a few metres; check which way is up: {up}; check that the pictures are sharp \
+         and show the room from several places; or use other weights: these may not be trained for such a place"
+    )]
+    NothingOccupied {
+        /// Voxels looked at.
+        sites: usize,
+        /// Their edge.
+        voxel_cm: u32,
+        /// Keyframes used.
+        keyframes: usize,
+        /// The space in which the cameras move, in words.
+        cameras: String,
+        /// How the up direction is known, in words.
+        up: String,
+    },
+    /// The network's voxels have one size, so that they cannot be made larger.
+    #[error(
+        "expected room for the whole surface on this device, found more than its {limit} bricks of voxels; \
+         take fewer keyframes or a smaller reach, or scan room by room"
+    )]
+    TooLarge {
+        /// Bricks that fit.
+        limit: usize,
     },
 }
 
@@ -63,21 +108,54 @@ pub async fn run(
     device: &Device,
     sink: &mut impl Sink,
 ) -> Result<Outcome, RunError> {
-    sink.stage(Stage::WarmingUp, 1);
-    warm_up(plan, device).await?;
-    sink.progress(1);
-    let mut fusion = Fusion {
-        volume: plan.volume.init(device)?,
-        frames: 0,
-        next_surface: 1,
-        stopped: false,
-    };
+    let mut fusion = begin(plan, device, sink).await?;
     match &plan.depth {
         DepthSource::Sensor => sensor::fuse(scan, &plan.keyframes, &mut fusion, sink).await?,
         DepthSource::Stereo(config) => {
             stereo::fuse(scan, &plan.keyframes, config, device, &mut fusion, sink).await?;
         }
+        DepthSource::Network(_) => return Err(RunError::NoWeights),
     }
+    finish(plan, fusion, sink).await
+}
+
+/// Runs a plan on a device with a network at hand; [`run`] does without one, and keeps it out of programs that have none.
+///
+/// # Errors
+/// As [`run`]; keyframes that do not overlap, and a network that finds no surface.
+pub async fn reconstruct(
+    scan: &Scan,
+    plan: &Plan,
+    network: &impl Network,
+    device: &Device,
+    sink: &mut impl Sink,
+) -> Result<Outcome, RunError> {
+    let DepthSource::Network(config) = &plan.depth else {
+        return run(scan, plan, device, sink).await;
+    };
+    let mut fusion = begin(plan, device, sink).await?;
+    let keyframes = &plan.keyframes;
+    neural::fuse(scan, keyframes, config, network, device, &mut fusion, sink).await?;
+    finish(plan, fusion, sink).await
+}
+
+async fn begin(plan: &Plan, device: &Device, sink: &mut impl Sink) -> Result<Fusion, RunError> {
+    sink.stage(Stage::WarmingUp, 1);
+    warm_up(plan, device).await?;
+    sink.progress(1);
+    Ok(Fusion {
+        volume: plan.volume.init(device)?,
+        frames: 0,
+        next_surface: 1,
+        stopped: false,
+    })
+}
+
+async fn finish(
+    plan: &Plan,
+    mut fusion: Fusion,
+    sink: &mut impl Sink,
+) -> Result<Outcome, RunError> {
     if fusion.frames == 0 && !fusion.stopped {
         return Err(RunError::NothingFused {
             keyframes: plan.keyframes.len(),
@@ -113,8 +191,8 @@ async fn warm_up(plan: &Plan, device: &Device) -> Result<(), RunError> {
         depth_m: &[plan.options.max_depth_m * 0.5; 4],
         depth_camera: camera,
         confidence: match plan.depth {
-            DepthSource::Sensor => None,
             DepthSource::Stereo(_) => Some(&sure),
+            DepthSource::Sensor | DepthSource::Network(_) => None,
         },
         color: plan.volume.color.then_some((&[0; 12], camera)),
         world_from_camera: Affine3A::IDENTITY,

@@ -79,7 +79,7 @@ fn luma(image: &ColorImage) -> Vec<f32> {
 }
 
 /// Resizes by averaging over the area that each new pixel covers, so that nothing is aliased.
-fn shrink(from: &[f32], (width, height): (usize, usize), to: (usize, usize)) -> Vec<f32> {
+pub fn shrink(from: &[f32], (width, height): (usize, usize), to: (usize, usize)) -> Vec<f32> {
     if (width, height) == to {
         return from.to_vec();
     }

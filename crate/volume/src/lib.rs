@@ -14,11 +14,13 @@ mod extract;
 mod field;
 mod integrate;
 mod lattice;
+mod points;
 mod view;
 mod volume;
 
 pub use error::VolumeError;
 pub use extract::{BrickMeshes, SurfaceRule};
 pub use lattice::{BRICK_EDGE, BRICK_VOXELS, Brick};
+pub use points::Point;
 pub use view::DepthView;
 pub use volume::{BYTES_PER_BRICK, Volume, VolumeConfig};

@@ -205,17 +205,22 @@ impl Volume {
                 colors.push(weight);
             }
         }
+        self.write(bricks, samples, colors);
+        self.mark_changed(bricks);
+        Ok(())
+    }
+
+    /// Overwrites the numbers of bricks that have their slots.
+    pub(crate) fn write(&mut self, bricks: &[Brick], samples: Vec<f32>, colors: Vec<f32>) {
         let slots: Vec<i32> = bricks
             .iter()
             .map(|&brick| self.lattice.slot(brick))
             .collect();
         self.field.set(slots, samples, colors);
-        self.mark_changed(bricks);
-        Ok(())
     }
 
     /// Makes room for bricks and gives them their slots.
-    fn reserve(&mut self, bricks: &[Brick]) -> Result<(), VolumeError> {
+    pub(crate) fn reserve(&mut self, bricks: &[Brick]) -> Result<(), VolumeError> {
         let fresh = bricks
             .iter()
             .filter(|&&brick| self.lattice.slot(brick) == EMPTY_SLOT);
@@ -236,7 +241,7 @@ impl Volume {
     }
 
     /// Notes that the surface in `bricks` may differ, and in the seven bricks below each: their cells reach into it.
-    fn mark_changed(&mut self, bricks: &[Brick]) {
+    pub(crate) fn mark_changed(&mut self, bricks: &[Brick]) {
         for &brick in bricks {
             for corner in 0..8 {
                 let below = brick - IVec3::new(corner & 1, corner >> 1 & 1, corner >> 2);

@@ -1,6 +1,6 @@
 //! What the user may ask for, and what of it makes sense.
 
-use super::PlanError;
+use super::{PlanError, network::NetworkConfig};
 use scan::Scan;
 use stereo::StereoConfig;
 
@@ -11,18 +11,21 @@ pub enum DepthSource {
     Sensor,
     /// Plane-sweep stereo over the colour images.
     Stereo(StereoConfig),
+    /// No depth at all: the network makes the surface from colour and poses at once.
+    Network(NetworkConfig),
 }
 
 /// What the user asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// Edge of a voxel in metres.
+    /// Edge of a voxel in metres; the network has its own.
     pub voxel_size_m: f32,
     /// Take every n-th keyframe; at least 1.
     pub every: usize,
-    /// Take this many of those keyframes, evenly spread from the first to the last; `None` for all.
+    /// Take this many of those keyframes, evenly spread from the first to the last; `None` for all. With the network this
+    /// is for the whole scan; [`NetworkConfig::views_a_tile`] bounds what one place is made from.
     pub views: Option<usize>,
-    /// Depth beyond this is not used, in metres.
+    /// Depth beyond this is not used, in metres; the network has [`NetworkConfig::reach_m`].
     pub max_depth_m: f32,
     /// Where depth comes from; `None` for the sensor's where the scan has depth, else stereo.
     pub depth: Option<DepthSource>,
@@ -77,15 +80,26 @@ impl Options {
             DepthSource::Sensor => Ok(depth),
             DepthSource::Stereo(config) => {
                 config.check()?;
-                if self.views == Some(1) {
-                    return Err(PlanError::Setting {
-                        what: "to take at least 2 keyframes, for stereo compares them",
-                        found: "1 view".into(),
-                    });
-                }
+                self.at_least_two()?;
+                Ok(depth)
+            }
+            DepthSource::Network(config) => {
+                config.check()?;
+                self.at_least_two()?;
                 Ok(depth)
             }
         }
+    }
+
+    /// One picture alone has nothing to be compared with.
+    fn at_least_two(&self) -> Result<(), PlanError> {
+        if self.views == Some(1) {
+            return Err(PlanError::Setting {
+                what: "to take at least 2 keyframes, for they are compared",
+                found: "1 view".into(),
+            });
+        }
+        Ok(())
     }
 
     /// The keyframes that are asked for, out of those that can be used.

@@ -1,0 +1,217 @@
+//! Coarse to fine: what the views say of each tile's voxels, the 3D network over all of them, and those that go on.
+
+use super::{network::Network, pictures::Pictures, tiles::Tiling};
+use crate::event::{Flow, Sink, Stage};
+use burn::{
+    Tensor,
+    tensor::{DType, Device, Int, TensorData},
+};
+use glam::IVec3;
+use net::{Level, View};
+use scan::{Finding, Severity};
+use std::ops::Range;
+
+/// Pairs of a voxel and a view that are fused at a time, at most: bounds the memory of the tokens.
+const PAIRS_A_BLOCK: usize = 200_000;
+/// Voxels that a level may have, at most: 5,000 fine ones are a square metre of surface.
+const SITES_AT_MOST: [usize; 3] = [usize::MAX, 1 << 19, 1 << 21];
+/// The distance is this times the hyperbolic tangent of the fine level's logit (method 1.4).
+const TSDF_GAIN: f32 = 1.05;
+
+/// Why there is no field.
+pub(super) enum Fault {
+    /// No voxel of a level has a surface near it.
+    Nothing {
+        /// The level.
+        level: Level,
+        /// Its voxels.
+        sites: usize,
+    },
+    /// The device failed.
+    Device(String),
+}
+
+/// Distances at the fine sites.
+pub(super) struct Field {
+    /// The sites.
+    pub sites: Vec<IVec3>,
+    /// Signed distance over the truncation distance, positive in free space.
+    pub distances: Vec<f32>,
+}
+
+/// What a level hands to the next one.
+struct Parents {
+    /// `[N, C]` of the parents, repeated for each child.
+    features: Tensor<2>,
+    /// `[N, 1]`, likewise.
+    logit: Tensor<2>,
+}
+
+/// All three levels. `None` if the sink stopped it.
+pub(super) async fn decode<N: Network>(
+    tiling: &Tiling,
+    pictures: &Pictures<'_, N::Plane>,
+    network: &N,
+    device: &Device,
+    sink: &mut impl Sink,
+) -> Result<Option<Field>, Fault> {
+    // Sites of all tiles, tile by tile: children keep their parents' order.
+    let mut sites: Vec<IVec3> = Vec::new();
+    let mut tiles: Vec<(Vec<usize>, Range<usize>)> = Vec::new();
+    for tile in &tiling.tiles {
+        let views = tile.views.iter().copied();
+        let views: Vec<usize> = views.filter(|&view| pictures.of(view).is_some()).collect();
+        if !views.is_empty() {
+            let start = sites.len();
+            sites.extend(tiling.sites(tile));
+            tiles.push((views, start..sites.len()));
+        }
+    }
+    let mut parents: Option<Parents> = None;
+    for level in Level::ALL {
+        let lattice = Lattice {
+            level,
+            sites: &sites,
+            tiles: &tiles,
+            tiling,
+        };
+        let Some(fused) = lattice.fuse(pictures, network, sink).await else {
+            return Ok(None);
+        };
+        let input = match parents {
+            None => fused,
+            Some(parents) => Tensor::cat(vec![parents.features, fused, parents.logit], 1),
+        };
+        let decoded = network.decode(level, input, &sites, tiling.origin_m);
+        let logits = read(decoded.logit.clone()).await?;
+        sink.progress(lattice.blocks().len() + 1);
+        if level == Level::Fine {
+            let distances = logits.iter().map(|&logit| TSDF_GAIN * logit.tanh());
+            return Ok(Some(Field {
+                distances: distances.collect(),
+                sites,
+            }));
+        }
+        let kept = occupied(&logits, level, sink);
+        if kept.is_empty() {
+            let sites = sites.len();
+            return Err(Fault::Nothing { level, sites });
+        }
+        let children = kept.iter().flat_map(|&parent| [parent as i32; 8]);
+        let rows = TensorData::new(children.collect::<Vec<i32>>(), [8 * kept.len()]);
+        let rows = Tensor::<1, Int>::from_data(rows, (device, DType::I32));
+        parents = Some(Parents {
+            features: decoded.features.select(0, rows.clone()),
+            logit: decoded.logit.select(0, rows),
+        });
+        for (_, range) in &mut tiles {
+            let of = |end: usize| 8 * kept.partition_point(|&site| site < end);
+            *range = of(range.start)..of(range.end);
+        }
+        sites = kept
+            .iter()
+            .flat_map(|&site| children_of(sites[site]))
+            .collect();
+    }
+    Ok(None)
+}
+
+/// The eight children of a site, x fastest.
+fn children_of(site: IVec3) -> impl Iterator<Item = IVec3> {
+    (0..8).map(move |child| 2 * site + IVec3::new(child & 1, child >> 1 & 1, child >> 2))
+}
+
+/// A level's sites.
+struct Lattice<'a> {
+    level: Level,
+    sites: &'a [IVec3],
+    tiles: &'a [(Vec<usize>, Range<usize>)],
+    tiling: &'a Tiling,
+}
+
+impl Lattice<'_> {
+    /// Pieces of work, in order: a tile and some of its sites.
+    fn blocks(&self) -> Vec<(usize, Range<usize>)> {
+        let mut blocks = Vec::new();
+        for (tile, (views, range)) in self.tiles.iter().enumerate() {
+            let step = (PAIRS_A_BLOCK / views.len()).max(1);
+            let starts = range.clone().step_by(step);
+            blocks.extend(starts.map(|start| (tile, start..(start + step).min(range.end))));
+        }
+        blocks
+    }
+
+    /// What the views say of every site: `[N, C]`. `None` if the sink stopped it.
+    async fn fuse<N: Network>(
+        &self,
+        pictures: &Pictures<'_, N::Plane>,
+        network: &N,
+        sink: &mut impl Sink,
+    ) -> Option<Tensor<2>> {
+        let blocks = self.blocks();
+        // The 3D network is the last step.
+        sink.stage(Stage::Decoding(self.level), blocks.len() + 1);
+        let mut fused: Vec<Tensor<2>> = Vec::with_capacity(blocks.len());
+        let mut current: Option<(usize, N::Plane, Vec<View>)> = None;
+        for (done, (tile, range)) in blocks.into_iter().enumerate() {
+            if sink.checkpoint().await == Flow::Stop {
+                return None;
+            }
+            let (plane, views) = match &mut current {
+                Some((at, plane, views)) if *at == tile => (plane, views),
+                other => {
+                    let views = self.tiles[tile].0.iter();
+                    let chosen = views.filter_map(|&view| pictures.of(view));
+                    let chosen: Vec<_> = chosen.collect();
+                    let planes: Vec<_> = chosen.iter().map(|p| p.plane(self.level)).collect();
+                    let views = chosen.iter().map(|picture| picture.view).collect();
+                    let (_, plane, views) = other.insert((tile, network.stack(&planes), views));
+                    (plane, views)
+                }
+            };
+            let sites = &self.sites[range];
+            let origin_m = self.tiling.origin_m;
+            fused.push(network.fuse(self.level, plane, views, sites, origin_m));
+            sink.progress(done + 1);
+        }
+        (sink.checkpoint().await == Flow::Continue).then(|| Tensor::cat(fused, 0))
+    }
+}
+
+/// Sites whose logit is above 0, ascending; the surest of them where they are too many, which is told.
+fn occupied(logits: &[f32], level: Level, sink: &mut impl Sink) -> Vec<usize> {
+    let all = 0..logits.len();
+    let mut kept: Vec<usize> = all.filter(|&site| logits[site] > 0.0).collect();
+    let limit = SITES_AT_MOST[level as usize + 1] / 8;
+    if kept.len() > limit {
+        sink.finding(too_many(kept.len(), logits.len(), limit, level));
+        // The place breaks ties, so that the choice is the same everywhere.
+        kept.sort_by(|&a, &b| logits[b].total_cmp(&logits[a]).then(a.cmp(&b)));
+        kept.truncate(limit);
+        kept.sort_unstable();
+    }
+    kept
+}
+
+fn too_many(found: usize, sites: usize, limit: usize, level: Level) -> Finding {
+    let voxel_cm = level.voxel_size_m() * 100.0;
+    Finding {
+        severity: Severity::Warning,
+        code: "surface-everywhere",
+        file: None,
+        line: None,
+        expected: format!("a surface near at most {limit} voxels of {voxel_cm:.0} cm"),
+        found: format!("one near {found} of {sites}"),
+        advice: "Only the surest are kept, and parts of the room may be missing. If the scan is no larger than a few rooms, the weights \
+                 do not know pictures like these: check that they are trained, and that poses are in metres"
+            .to_owned(),
+        frames_affected: 0,
+    }
+}
+
+async fn read(logit: Tensor<2>) -> Result<Vec<f32>, Fault> {
+    let data = logit.into_data_async().await;
+    let data = data.map_err(|error| Fault::Device(error.to_string()))?;
+    data.try_into_vec::<f32>()
+        .map_err(|error| Fault::Device(format!("{error:?}")))
+}
