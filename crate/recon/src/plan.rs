@@ -5,7 +5,7 @@ mod network;
 mod options;
 
 use bricks::Foresight;
-pub(crate) use network::NETWORK_VOXEL_M;
+pub(crate) use network::working_size;
 pub use network::{NetworkConfig, Preset, ViewChoice};
 pub use options::{DepthSource, Options};
 use scan::{Camera, Frame, KeyframeRule, Scan, keyframes};
@@ -94,6 +94,9 @@ pub enum PlanError {
     /// A setting of stereo that makes no sense.
     #[error(transparent)]
     Stereo(#[from] StereoError),
+    /// Pictures that the network cannot take.
+    #[error(transparent)]
+    Pictures(#[from] net::planes::PlanesError),
 }
 
 /// Plans a run: decides where depth comes from, chooses keyframes, foretells the size of the volume from the depth of
@@ -124,6 +127,7 @@ pub fn plan(scan: &Scan, limits: &Limits, options: Options) -> Result<Plan, Plan
             Foresight::from_cameras(scan, &keyframes, f64::from(far_m))
         }
         DepthSource::Network(config) => {
+            network::check_pictures(&config, keyframes.iter().map(|&f| &frames[f]))?;
             Foresight::from_cameras(scan, &keyframes, f64::from(config.reach_m))
         }
     };
@@ -132,7 +136,7 @@ pub fn plan(scan: &Scan, limits: &Limits, options: Options) -> Result<Plan, Plan
     let wanted_m = match &depth {
         DepthSource::Network(config) => {
             remarks.extend(network_remarks(config, &options, keyframes.len()));
-            NETWORK_VOXEL_M
+            network::VOXEL_M
         }
         _ => options.voxel_size_m,
     };
@@ -235,10 +239,10 @@ fn network_remarks(config: &NetworkConfig, options: &Options, keyframes: usize) 
             config.views_a_tile
         ));
     }
-    if options.voxel_size_m != NETWORK_VOXEL_M {
+    if options.voxel_size_m != network::VOXEL_M {
         remarks.push(format!(
             "the network is made for voxels of {:.1} cm, which are used instead of {:.1} cm",
-            NETWORK_VOXEL_M * 100.0,
+            network::VOXEL_M * 100.0,
             options.voxel_size_m * 100.0
         ));
     }

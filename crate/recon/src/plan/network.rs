@@ -1,9 +1,11 @@
 //! What the network's source may be told.
 
 use super::PlanError;
+use net::planes;
+use scan::{Camera, Frame};
 
 /// Voxels of the network's finest level, in metres.
-pub(crate) const NETWORK_VOXEL_M: f32 = 0.04;
+pub(super) const VOXEL_M: f32 = 0.04;
 
 /// Which of the keyframes that see a tile are used, when there are more than [`NetworkConfig::views_a_tile`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -116,4 +118,22 @@ impl NetworkConfig {
         }
         Ok(())
     }
+}
+
+/// The size that pictures of this camera are brought to: as large as fits, with their proportions.
+pub(crate) fn working_size(camera: &Camera, size: (u32, u32)) -> (u32, u32) {
+    let fitted = stereo::view::fit(camera, size);
+    (fitted.width, fitted.height)
+}
+
+/// Whether the network takes the pictures of these keyframes; the first one says what they are scaled to.
+pub(super) fn check_pictures<'a>(
+    config: &NetworkConfig,
+    mut keyframes: impl Iterator<Item = &'a Frame>,
+) -> Result<(), PlanError> {
+    let Some(first) = keyframes.next() else {
+        return Ok(());
+    };
+    let (width, height) = working_size(&first.color_camera, config.size);
+    Ok(planes::check_size(width as usize, height as usize)?)
 }

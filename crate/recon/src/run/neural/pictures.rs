@@ -3,15 +3,16 @@
 use crate::{
     convert::{pinhole, pose},
     event::Sink,
+    plan::working_size,
 };
 use burn::{
     Tensor,
     tensor::{DType, Device, TensorData},
 };
 use net::{Level, View};
-use scan::{Camera, ColorImage, Scan};
+use scan::{ColorImage, Scan};
 use std::collections::BTreeMap;
-use stereo::view::{fit, shrink};
+use stereo::view::shrink;
 
 /// A keyframe's view and what the network keeps of its picture.
 pub(super) struct Picture<P> {
@@ -89,12 +90,6 @@ impl<'a, P> Pictures<'a, P> {
     pub fn all(&self) -> impl Iterator<Item = &Picture<P>> {
         self.kept.values()
     }
-}
-
-/// As large as fits, with the picture's proportions.
-fn working_size(camera: &Camera, size: (u32, u32)) -> (u32, u32) {
-    let fitted = fit(camera, size);
-    (fitted.width, fitted.height)
 }
 
 /// Red, green and blue after each other, at another size.

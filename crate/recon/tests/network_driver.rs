@@ -1,0 +1,465 @@
+//! The network's driver without its network: an oracle that knows the room stands in for it, so that tiles, views, levels,
+//! volume and colours are seen to be right before anything is learnt.
+
+// A test that cannot go on may say so by a panic.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+mod common;
+
+use burn::{
+    Tensor,
+    tensor::{Device, TensorData},
+};
+use common::{Recorder, SEED, color_alone, files, open, sample};
+use glam::{DAffine3, IVec3, Vec3};
+use mesh::Mesh;
+use net::View;
+use recon::{
+    Decoded, DepthSource, Level, Limits, Network, NetworkConfig, Options, Outcome, PlanError,
+    RunError, Stage, ViewChoice,
+    evaluate::{Protocol, evaluate},
+};
+use scan::Scan;
+use std::cell::RefCell;
+use synth::Room;
+use volume::VolumeConfig;
+
+const TRUNCATION_M: f32 = 0.12;
+
+/// Knows the room, and remembers what it was asked.
+struct Oracle {
+    room: Room,
+    room_from_canonical: DAffine3,
+    /// Level, views and sites of every block.
+    blocks: RefCell<Vec<(Level, usize, usize)>>,
+    /// Says that there is nothing at all.
+    empty: bool,
+    device: Device,
+}
+
+impl Oracle {
+    fn new(scan: &Scan) -> Self {
+        let (turn, shift) = sample().world_from_room();
+        let scan_from_room = DAffine3::from_mat3_translation(turn.as_dmat3(), shift.as_dvec3());
+        Self {
+            room: Room::new(SEED),
+            room_from_canonical: scan_from_room.inverse() * scan.scan_from_canonical(),
+            blocks: RefCell::new(Vec::new()),
+            empty: false,
+            device: Device::flex(),
+        }
+    }
+
+    /// Free space outside the walls does not count.
+    fn distance_m(&self, point: Vec3) -> f32 {
+        let point = self.room_from_canonical.transform_point3(point.as_dvec3());
+        let point = point.as_vec3();
+        let size = self.room.size_m();
+        let center = Vec3::new(0.0, 0.0, 0.5 * size.z);
+        let outside = ((point - center).abs() - 0.5 * size).max_element();
+        if outside > 0.0 {
+            return -outside;
+        }
+        self.room.distance(point)
+    }
+
+    /// The best that voxels of 4 cm can do: its distances at every lattice point of the room.
+    fn everywhere(&self) -> Mesh {
+        let mut volume = VolumeConfig::uniform(0.04).init(&self.device).unwrap();
+        let near = |brick: &IVec3| {
+            let center = (brick.as_vec3() + 0.5) * volume.brick_size_m();
+            self.distance_m(center).abs() < 0.5
+        };
+        let all = (0..57 * 57 * 57).map(|i| IVec3::new(i % 57, i / 57 % 57, i / 57 / 57) - 28);
+        let bricks: Vec<IVec3> = all.filter(near).collect();
+        volume
+            .fill(&bricks, |point| Some((self.distance_m(point), [0; 3])))
+            .unwrap();
+        pollster::block_on(volume.mesh()).unwrap()
+    }
+
+    fn column(&self, values: Vec<f32>) -> Tensor<2> {
+        let rows = values.len();
+        Tensor::from_data(TensorData::new(values, [rows, 1]), &self.device)
+    }
+}
+
+/// A site's place as one number that a child can check its parent by.
+fn mark(site: IVec3) -> f32 {
+    (site.x + 211 * site.y + 211 * 211 * site.z).rem_euclid(65_521) as f32
+}
+
+impl Network for Oracle {
+    /// How many pictures.
+    type Plane = usize;
+
+    fn planes(&self, images: Tensor<4>, views: &[View]) -> [usize; 3] {
+        let [count, channels, height, width] = images.dims();
+        assert_eq!((count, channels), (views.len(), 3));
+        let camera = views[0].camera;
+        assert_eq!(
+            [width, height],
+            [camera.width as usize, camera.height as usize]
+        );
+        let brightest = images.max().into_scalar::<f32>();
+        assert!((100.0..=255.0).contains(&brightest), "0 to 255, not 0 to 1");
+        [count; 3]
+    }
+
+    fn stack(&self, planes: &[&usize]) -> usize {
+        planes.iter().copied().sum()
+    }
+
+    fn fuse(
+        &self,
+        level: Level,
+        plane: &usize,
+        views: &[View],
+        sites: &[IVec3],
+        _origin_m: Vec3,
+    ) -> Tensor<2> {
+        assert_eq!(*plane, views.len());
+        self.blocks
+            .borrow_mut()
+            .push((level, views.len(), sites.len()));
+        self.column(sites.iter().map(|&site| mark(site)).collect())
+    }
+
+    fn decode(
+        &self,
+        level: Level,
+        features: Tensor<2>,
+        sites: &[IVec3],
+        origin_m: Vec3,
+    ) -> Decoded {
+        let [rows, columns] = features.dims();
+        assert_eq!(rows, sites.len());
+        let values: Vec<f32> = features.into_data().try_into_vec().unwrap();
+        let distances: Vec<f32> = sites
+            .iter()
+            .map(|site| self.distance_m(site.as_vec3() * level.voxel_size_m() + origin_m))
+            .collect();
+        for (row, site) in values.chunks(columns).zip(sites) {
+            if level == Level::Coarse {
+                assert_eq!(row, [mark(*site)], "what views say of the site");
+            } else {
+                // The parent's features, the site's own, the parent's logit.
+                let parent = site.div_euclid(IVec3::splat(2));
+                assert_eq!(row[..2], [mark(parent), mark(*site)]);
+                assert!(row[2] > 0.0, "an occupied parent");
+            }
+        }
+        let logit = |distance_m: &f32| match level {
+            Level::Fine => (distance_m / TRUNCATION_M / 1.05)
+                .clamp(-0.95, 0.95)
+                .atanh(),
+            _ if self.empty => -1.0,
+            // A child may lie anywhere from its parent to the next one.
+            _ => TRUNCATION_M + 2.0 * level.voxel_size_m() - distance_m.abs(),
+        };
+        Decoded {
+            features: self.column(sites.iter().map(|&site| mark(site)).collect()),
+            logit: self.column(distances.iter().map(logit).collect()),
+        }
+    }
+}
+
+fn config() -> NetworkConfig {
+    NetworkConfig {
+        size: (160, 120),
+        views_a_tile: 12,
+        reach_m: 3.0,
+        ..NetworkConfig::default()
+    }
+}
+
+fn options(config: NetworkConfig) -> Options {
+    Options {
+        depth: Some(DepthSource::Network(config)),
+        ..Options::default()
+    }
+}
+
+fn run_with(
+    scan: &Scan,
+    config: NetworkConfig,
+    oracle: &Oracle,
+    sink: &mut Recorder,
+) -> Result<Outcome, RunError> {
+    let plan = recon::plan(scan, &Limits::default(), options(config)).unwrap();
+    let device = Device::flex();
+    pollster::block_on(recon::reconstruct(scan, &plan, oracle, &device, sink))
+}
+
+fn mesh_of(outcome: &Outcome) -> Mesh {
+    pollster::block_on(outcome.volume.mesh()).unwrap()
+}
+
+#[test]
+fn an_oracle_reconstructs_the_room() {
+    // Its depth is there to judge by; the driver has colour alone.
+    let scan = open(files(|_, bytes| Some(bytes)));
+    let blind = open(color_alone(|_, bytes| bytes));
+    let oracle = Oracle::new(&blind);
+    let mut sink = Recorder {
+        watching: true,
+        ..Recorder::default()
+    };
+    let outcome = run_with(&blind, config(), &oracle, &mut sink).unwrap();
+    let mut mesh = mesh_of(&outcome);
+    mesh.validate().unwrap();
+    mesh.transform(&blind.scan_from_canonical());
+    let mut best = oracle.everywhere();
+    best.transform(&blind.scan_from_canonical());
+    let mut truth = Room::new(SEED).mesh();
+    let (turn, shift) = sample().world_from_room();
+    truth.transform(&DAffine3::from_mat3_translation(
+        turn.as_dmat3(),
+        shift.as_dvec3(),
+    ));
+    let (device, protocol) = (Device::flex(), Protocol::TransformerFusion);
+    let judge = |mesh: &Mesh, truth: &Mesh| {
+        let judged = evaluate(mesh, truth, Some(&scan), protocol, 0, &device, |_, _| ());
+        pollster::block_on(judged).unwrap()
+    };
+    let report = judge(&mesh, &truth);
+    let depth = report.depth.unwrap();
+    let (f, f_best) = (report.surface.f_score, judge(&best, &truth).surface.f_score);
+    let f_between = judge(&mesh, &best).surface.f_score;
+    println!(
+        "F {f}, of the densely sampled room {f_best}, against that {f_between}; depth {depth:?}"
+    );
+    // Truth has backs of furniture that no picture shows and legs thinner than a voxel.
+    assert!(f > 0.94 && f > f_best - 0.005);
+    assert!(f_between > 0.99);
+    assert!(depth.abs_rel < 0.02, "rendered where the sensor saw it");
+
+    // The plan's guess is no less than what was needed, and not absurdly more.
+    let plan = recon::plan(&blind, &Limits::default(), options(config())).unwrap();
+    let ratio = plan.bricks as f64 / outcome.volume.brick_count() as f64;
+    println!("{} bricks planned, {ratio} of the real ones", plan.bricks);
+    assert!((1.0..6.0).contains(&ratio), "{ratio} of the bricks used");
+
+    // Every level in its turn, all work counted, the surface handed over.
+    let order: Vec<Stage> = sink.stages.iter().map(|(stage, _)| *stage).collect();
+    let levels = Level::ALL.map(Stage::Decoding);
+    let expected = [&[Stage::WarmingUp, Stage::Features], &levels[..]].concat();
+    let expected = [expected, vec![Stage::Coloring, Stage::Meshing]].concat();
+    assert_eq!(order, expected);
+    for (stage, total) in &sink.stages[..6] {
+        let progress = &sink.progress_of[stage];
+        assert!(progress.is_sorted());
+        assert_eq!(progress.last(), Some(total), "{stage:?}");
+    }
+    assert!(sink.surfaces.iter().sum::<usize>() >= mesh.triangles.len());
+    assert!(sink.findings.is_empty(), "{:?}", sink.findings);
+    let blocks = oracle.blocks.borrow();
+    for &(level, views, sites) in blocks.iter() {
+        assert!(views <= 12 && views * sites <= 200_000, "{level:?}");
+    }
+}
+
+#[test]
+fn colours_are_those_that_the_pictures_show() {
+    let with_depth = open(files(|_, bytes| Some(bytes)));
+    let scan = open(color_alone(|_, bytes| bytes));
+    let oracle = Oracle::new(&scan);
+    let outcome = run_with(&scan, config(), &oracle, &mut Recorder::default()).unwrap();
+    let mut mesh = mesh_of(&outcome);
+    mesh.transform(&scan.scan_from_canonical());
+    // At vertices that a frame sees, as its sensor says.
+    let mut errors: Vec<u8> = Vec::new();
+    for index in (0..with_depth.frames().len()).step_by(5) {
+        let frame = &with_depth.frames()[index];
+        let (color, depth) = (with_depth.color(index), with_depth.depth(index));
+        let (color, depth) = (color.unwrap(), depth.unwrap().unwrap());
+        let camera_from_scan = (with_depth.scan_from_canonical() * frame.pose).inverse();
+        for (position, found) in mesh.positions.iter().zip(&mesh.colors) {
+            let point = camera_from_scan.transform_point3(position.as_dvec3());
+            let Some(pixel) = frame.depth_camera.project(point).map(|p| p.round()) else {
+                continue;
+            };
+            let (width, height) = (f64::from(depth.width), f64::from(depth.height));
+            if pixel.cmplt(glam::DVec2::ZERO).any() || pixel.x >= width || pixel.y >= height {
+                continue;
+            }
+            let at = pixel.y as usize * depth.width as usize + pixel.x as usize;
+            if (f64::from(depth.depth_m[at]) - point.z).abs() < 0.02 {
+                let shown = &color.rgb[at * 3..][..3];
+                errors.extend(found.iter().zip(shown).map(|(a, b)| a.abs_diff(*b)));
+            }
+        }
+    }
+    errors.sort_unstable();
+    let part = |share: f64| errors[(errors.len() as f64 * share) as usize];
+    println!(
+        "{} numbers: {} at half, {} at nine tenths",
+        errors.len(),
+        part(0.5),
+        part(0.9)
+    );
+    assert!(errors.len() > 20_000);
+    assert!(part(0.5) < 8 && part(0.9) < 40);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_mesh_and_another_seed_other_views() {
+    let scan = open(color_alone(|_, bytes| bytes));
+    let oracle = Oracle::new(&scan);
+    let mesh = |seed, choice| {
+        let config = NetworkConfig {
+            seed,
+            choice,
+            views_a_tile: 6,
+            ..config()
+        };
+        let outcome = run_with(&scan, config, &oracle, &mut Recorder::default()).unwrap();
+        (mesh_of(&outcome), outcome.frames_fused)
+    };
+    for choice in [ViewChoice::Coverage, ViewChoice::Random] {
+        let (first, frames) = mesh(1, choice);
+        let (again, frames_again) = mesh(1, choice);
+        assert_eq!(frames, frames_again);
+        assert_eq!(first.positions, again.positions);
+        assert_eq!(first.triangles, again.triangles);
+        assert_eq!(first.colors, again.colors);
+    }
+}
+
+#[test]
+fn broken_pictures_are_reported_and_the_rest_goes_on() {
+    let scan = open(color_alone(|path, mut bytes| {
+        if path.contains("000009.color") {
+            bytes.truncate(bytes.len() / 2);
+        }
+        bytes
+    }));
+    let mut sink = Recorder::default();
+    let outcome = run_with(&scan, config(), &Oracle::new(&scan), &mut sink).unwrap();
+    let plan = recon::plan(&scan, &Limits::default(), options(config())).unwrap();
+    assert_eq!(outcome.frames_fused, plan.keyframes.len() - 1);
+    let files = sink.findings.iter().filter_map(|f| f.file.as_deref());
+    let files: Vec<&str> = files.collect();
+    assert!(files.iter().all(|file| file.contains("000009.color")));
+    assert_eq!(files.len(), 1, "told once: {files:?}");
+}
+
+#[test]
+fn it_can_be_stopped_at_any_step() {
+    let scan = open(color_alone(|_, bytes| bytes));
+    let oracle = Oracle::new(&scan);
+    let mut sink = Recorder::default();
+    run_with(&scan, config(), &oracle, &mut sink).unwrap();
+    let steps = sink.checkpoints;
+    assert!(steps > 40, "{steps} places to stop at");
+    for stop_after in [0, steps / 4, steps / 2, steps - 2] {
+        let mut sink = Recorder {
+            stop_after: Some(stop_after),
+            ..Recorder::default()
+        };
+        let outcome = run_with(&scan, config(), &oracle, &mut sink).unwrap();
+        assert!(outcome.stopped, "after {stop_after} of {steps}");
+        assert!(sink.checkpoints <= stop_after + 1);
+        // Once distances are there, so is a surface, however few colours it has.
+        assert_eq!(
+            stop_after == steps - 2,
+            !mesh_of(&outcome).triangles.is_empty()
+        );
+    }
+}
+
+#[test]
+fn what_was_wrong_is_said() {
+    let scan = open(color_alone(|_, bytes| bytes));
+    let mut oracle = Oracle::new(&scan);
+    oracle.empty = true;
+    let mut sink = Recorder::default();
+    let error = run_with(&scan, config(), &oracle, &mut sink).err().unwrap();
+    let words = error.to_string();
+    assert!(matches!(error, RunError::NothingOccupied { .. }), "{words}");
+    for word in ["found none", "scale", "up", "degrees", "weights"] {
+        assert!(words.contains(word), "{word}: {words}");
+    }
+
+    // Each camera in a place of its own.
+    let apart = open(color_alone(|path, bytes| {
+        if !path.ends_with("pose.txt") {
+            return bytes;
+        }
+        let digits: String = path.chars().filter(char::is_ascii_digit).collect();
+        let frame: f64 = digits.parse().unwrap();
+        let text = String::from_utf8(bytes).unwrap();
+        let mut numbers: Vec<f64> = text
+            .split_whitespace()
+            .map(|n| n.parse().unwrap())
+            .collect();
+        numbers[3] += 50.0 * frame;
+        let rows = numbers
+            .chunks(4)
+            .map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(" "));
+        rows.collect::<Vec<_>>().join("\n").into_bytes()
+    }));
+    let error = run_with(&apart, config(), &oracle, &mut sink)
+        .err()
+        .unwrap();
+    let words = error.to_string();
+    assert!(matches!(error, RunError::NoOverlap { .. }), "{words}");
+    assert!(
+        words.contains("metres") && words.contains("overlap"),
+        "{words}"
+    );
+
+    // A plan for the network, and none at hand.
+    let plan = recon::plan(&scan, &Limits::default(), options(config())).unwrap();
+    let result = pollster::block_on(recon::run(&scan, &plan, &Device::flex(), &mut sink));
+    assert!(matches!(result.err(), Some(RunError::NoWeights)));
+}
+
+#[test]
+fn the_plan_says_what_it_cannot_grant() {
+    let scan = open(color_alone(|_, bytes| bytes));
+    let asked = Options {
+        voxel_size_m: 0.02,
+        ..options(NetworkConfig::default())
+    };
+    let plan = recon::plan(&scan, &Limits::default(), asked).unwrap();
+    assert_eq!(plan.options.voxel_size_m, 0.04);
+    let remarks = plan.remarks.join("\n");
+    let keyframes = plan.keyframes.len().to_string();
+    for word in ["60 views", &keyframes, "all of them", "4.0 cm", "2.0 cm"] {
+        assert!(remarks.contains(word), "{word}: {remarks}");
+    }
+    let wrong = [
+        NetworkConfig {
+            size: (16, 12),
+            ..config()
+        },
+        NetworkConfig {
+            views_a_tile: 1,
+            ..config()
+        },
+        NetworkConfig {
+            tile: [96, 97, 48],
+            ..config()
+        },
+        NetworkConfig {
+            reach_m: 0.0,
+            ..config()
+        },
+    ];
+    for config in wrong {
+        let result = recon::plan(&scan, &Limits::default(), options(config));
+        assert!(
+            matches!(result, Err(PlanError::Setting { .. })),
+            "{config:?}"
+        );
+    }
+    let none = open(files(|path, bytes| {
+        (!path.contains("color")).then_some(bytes)
+    }));
+    let result = recon::plan(&none, &Limits::default(), options(config()));
+    assert!(matches!(
+        result,
+        Err(PlanError::TooFewPictures { found: 0, .. })
+    ));
+}
