@@ -31,13 +31,23 @@ pub enum RunError {
     /// Stereo failed.
     #[error(transparent)]
     Stereo(#[from] StereoError),
-    /// Too few pictures could be used.
+    /// Not one depth image could be used or made.
     #[error(
-        "expected depth or colour in {keyframes} keyframes, found none or too little that can be used; the findings say what is wrong with each"
+        "expected depth in {keyframes} keyframes, found none that can be used; the findings say what is wrong with each"
     )]
     NothingFused {
         /// Keyframes tried.
         keyframes: usize,
+    },
+    /// Too few pictures for the network could be decoded.
+    #[error(
+        "expected pictures of at least 2 of {keyframes} keyframes, found {found} that can be used; the findings say what is wrong with each"
+    )]
+    TooFewPictures {
+        /// Keyframes tried.
+        keyframes: usize,
+        /// Pictures that could be decoded.
+        found: usize,
     },
     /// A plan for the network was run without one.
     #[error(

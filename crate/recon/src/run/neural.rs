@@ -59,8 +59,9 @@ pub(super) async fn fuse(
         sink.progress(done + 1);
     }
     if fusion.frames < 2 {
-        return Err(RunError::NothingFused {
+        return Err(RunError::TooFewPictures {
             keyframes: keyframes.len(),
+            found: fusion.frames,
         });
     }
 
