@@ -8,11 +8,16 @@ pub mod config;
 pub mod decode;
 pub mod fusion;
 pub mod guide;
+pub mod loss;
+pub mod model;
 pub mod named;
 pub mod ops;
 pub mod planes;
 pub mod sample;
 pub mod view;
+pub mod weights;
 
 pub use config::{Level, NetConfig};
+pub use model::Ipdrecon;
+pub use sample::Sample;
 pub use view::View;
