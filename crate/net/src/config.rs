@@ -52,7 +52,47 @@ pub struct NetConfig {
     pub guide: bool,
 }
 
+/// A configuration that no network can have.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "expected {expected} in the network's configuration, found {found}; start from `small` or `full`"
+)]
+pub struct ConfigError {
+    expected: &'static str,
+    found: String,
+}
+
 impl NetConfig {
+    /// Says whether such a network can be made.
+    ///
+    /// # Errors
+    /// Widths that do not fit each other.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        let fault = |expected, found: String| Err(ConfigError { expected, found });
+        let widths = self.backbone.iter().chain(&self.planes).chain(&self.unet);
+        if widths
+            .chain([&self.pyramid])
+            .any(|&width| width == 0 || width > 1024)
+        {
+            return fault("widths of 1 to 1024 channels", format!("{self:?}"));
+        }
+        // The pyramid's top is the backbone's last stage, as it is.
+        if self.pyramid != self.backbone[4] {
+            let found = format!("{} and {}", self.pyramid, self.backbone[4]);
+            return fault("as many channels in the pyramid as at stride 16", found);
+        }
+        // Two heads of attention; eight groups of channels for `matching`.
+        let step = if self.matching { 8 } else { 2 };
+        if self.planes.iter().any(|width| width % step != 0) {
+            let found = format!("{:?}", self.planes);
+            return fault(
+                "plane widths that are multiples of 2, with `matching` of 8,",
+                found,
+            );
+        }
+        Ok(())
+    }
+
     /// The paper's size with all of the paper's parts: 6.57 million parameters.
     pub fn full() -> Self {
         Self {

@@ -50,7 +50,7 @@ impl Ipdrecon {
         };
         let (fusion, decoders) = Level::ALL.map(level).into_iter().unzip();
         Self {
-            planes: PlaneNet::new(config, device),
+            planes: PlaneNet::init(config, device),
             fusion,
             decoders,
             config: config.clone(),

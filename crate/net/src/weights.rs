@@ -6,6 +6,7 @@ use burn::tensor::Device;
 use half::f16;
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView, serialize};
 
+use crate::config::ConfigError;
 use crate::{Ipdrecon, NetConfig, named};
 
 /// The version of names and layouts that this code reads and writes.
@@ -55,6 +56,9 @@ pub enum WeightsError {
         "expected a network's configuration in the header of the weights, found one that cannot be read: {0}"
     )]
     Config(#[from] serde_json::Error),
+    /// The stored configuration makes no sense.
+    #[error(transparent)]
+    Impossible(#[from] ConfigError),
     /// Tensors are missing, or there are some that the network does not have.
     #[error(
         "expected the tensors of the configuration in the file, found {missing} missing and {unknown} unknown (first: `{first}`); \
@@ -105,7 +109,7 @@ pub enum WeightsError {
 pub fn save(model: &Ipdrecon, precision: Precision) -> Result<Vec<u8>, WeightsError> {
     let mut stored = Vec::new();
     for (name, data) in named::tensors(model) {
-        let shape = data.shape.to_vec();
+        let shape = data.shape().to_vec();
         let values: Vec<f32> = data.iter::<f32>().collect();
         let (bytes, kept): (Vec<u8>, bool) = match precision {
             Precision::F32 => (
@@ -161,7 +165,11 @@ pub fn config(bytes: &[u8]) -> Result<NetConfig, WeightsError> {
     let entry = |key: &str| entries.and_then(|entries| entries.get(key));
     let config = entry(KEY_CONFIG).ok_or(WeightsError::NotOurs)?;
     match entry(KEY_VERSION) {
-        Some(version) if version == VERSION => Ok(serde_json::from_str(config)?),
+        Some(version) if version == VERSION => {
+            let config: NetConfig = serde_json::from_str(config)?;
+            config.check()?;
+            Ok(config)
+        }
         other => Err(WeightsError::Version {
             found: other.map_or("none", String::as_str).to_owned(),
         }),

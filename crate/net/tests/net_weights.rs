@@ -12,7 +12,7 @@ use net::{Ipdrecon, NetConfig, named};
 fn tiny() -> NetConfig {
     NetConfig {
         backbone: [8, 8, 8, 8, 16],
-        pyramid: 8,
+        pyramid: 16,
         planes: [16, 8, 8],
         unet: [4, 4, 4],
         ..NetConfig::full()
@@ -98,12 +98,12 @@ fn weights_of_another_version_program_or_shape_say_so() {
     assert!(matches!(error, WeightsError::NotOurs), "{error}");
 
     // Wider planes in the configuration than in the tensors.
-    let wider = edited(&bytes, r#"\"pyramid\":8"#, r#"\"pyramid\":9"#);
+    let wider = edited(&bytes, r#"\"unet\":[4,"#, r#"\"unet\":[5,"#);
     let error = load(&wider, &device).unwrap_err();
     let text = error.to_string();
     assert!(matches!(error, WeightsError::Shape { .. }), "{text}");
     assert!(
-        text.contains("pyramid") && text.contains("expected"),
+        text.contains("decoders") && text.contains("expected"),
         "{text}"
     );
 
@@ -111,6 +111,10 @@ fn weights_of_another_version_program_or_shape_say_so() {
     let fewer = edited(&bytes, r#"\"acm\":true"#, r#"\"acm\": !!!"#);
     let error = load(&fewer, &device).unwrap_err();
     assert!(matches!(error, WeightsError::Config(_)), "{error}");
+
+    let impossible = edited(&bytes, r#"\"pyramid\":16"#, r#"\"pyramid\":17"#);
+    let error = load(&impossible, &device).unwrap_err();
+    assert!(matches!(error, WeightsError::Impossible(_)), "{error}");
     assert_eq!(config(&bytes).unwrap(), tiny());
 }
 
