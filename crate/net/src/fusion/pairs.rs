@@ -1,7 +1,7 @@
 //! Which views see which voxels, and where.
 
 use burn::tensor::{Device, Tensor, TensorData};
-use glam::{IVec3, Mat3, Vec3};
+use glam::{DMat3, DVec3, IVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::View;
@@ -39,34 +39,41 @@ pub struct PairTensors {
     pub segments: Segments,
 }
 
-/// From sites to a plane's pixels.
+/// From sites to a plane's pixels. In 64 bits: what is left of a pixel after its whole part weighs features.
 struct Projection {
-    plane_from_site: Mat3,
-    offset: Vec3,
+    plane_from_site: DMat3,
+    offset: DVec3,
 }
 
 impl Projection {
     fn new(view: &View, voxel_size_m: f32, origin_m: Vec3, stride: usize) -> Self {
         let camera = &view.camera;
-        let by = 1.0 / stride as f32;
-        let plane_from_camera = Mat3::from_cols(
-            Vec3::new(camera.fx * by, 0.0, 0.0),
-            Vec3::new(0.0, camera.fy * by, 0.0),
-            Vec3::new(camera.cx * by, camera.cy * by, 1.0),
+        let intrinsics = [camera.fx, camera.fy, camera.cx, camera.cy];
+        let [fx, fy, cx, cy] = intrinsics.map(|k| f64::from(k) / stride as f64);
+        let plane_from_camera = DMat3::from_cols(
+            DVec3::new(fx, 0.0, 0.0),
+            DVec3::new(0.0, fy, 0.0),
+            DVec3::new(cx, cy, 1.0),
         );
-        let camera_from_world = view.world_from_camera.inverse();
-        let rotation = Mat3::from(camera_from_world.matrix3);
-        let offset = rotation * origin_m + Vec3::from(camera_from_world.translation);
+        let world_from_camera = DMat3::from_cols_array(
+            &view
+                .world_from_camera
+                .matrix3
+                .to_cols_array()
+                .map(f64::from),
+        );
+        let plane_from_world = plane_from_camera * world_from_camera.inverse();
+        let eye = DVec3::from(view.position_m());
         Self {
-            plane_from_site: plane_from_camera * rotation * voxel_size_m,
-            offset: plane_from_camera * offset,
+            plane_from_site: plane_from_world * f64::from(voxel_size_m),
+            offset: plane_from_world * (DVec3::from(origin_m) - eye),
         }
     }
 
     /// Column, row and depth.
-    fn project(&self, site: Vec3) -> Option<Vec3> {
-        let at = self.plane_from_site * site + self.offset;
-        (at.z > 0.0).then(|| Vec3::new(at.x / at.z, at.y / at.z, at.z))
+    fn project(&self, site: IVec3) -> Option<DVec3> {
+        let at = self.plane_from_site * site.as_dvec3() + self.offset;
+        (at.z > 0.0).then(|| DVec3::new(at.x / at.z, at.y / at.z, at.z))
     }
 }
 
@@ -85,20 +92,20 @@ impl Pairs {
             .iter()
             .map(|view| Projection::new(view, voxel_size_m, origin_m, stride))
             .collect();
-        let [right, bottom] = plane.map(|size| size as f32 - 1.0);
+        let [right, bottom] = plane.map(|size| size as f64 - 1.0);
         let parts: Vec<Self> = sites
             .par_chunks(VOXELS)
             .map(|sites| {
                 let mut part = Self::default();
                 for site in sites {
                     for (view, projection) in (0..).zip(&projections) {
-                        let Some(at) = projection.project(site.as_vec3()) else {
+                        let Some(at) = projection.project(*site) else {
                             continue;
                         };
                         if at.x >= 0.0 && at.y >= 0.0 && at.x <= right && at.y <= bottom {
-                            part.u.push(at.x);
-                            part.v.push(at.y);
-                            part.z_m.push(at.z);
+                            part.u.push(at.x as f32);
+                            part.v.push(at.y as f32);
+                            part.z_m.push(at.z as f32);
                             part.view.push(view);
                         }
                     }
