@@ -2,10 +2,14 @@
 
 pub mod affine;
 pub mod attention;
+pub mod batch_norm;
+pub mod depthwise;
 pub(crate) mod flex;
 pub mod linrec;
+pub mod pointwise;
 pub mod pool;
 pub mod rows;
 pub mod segments;
 pub mod sparse_conv;
 pub mod upsample;
+pub(crate) mod wide;

@@ -170,7 +170,7 @@ impl LevelPlanes {
                 let hidden = ipsd.forward(compensated, features.clone());
                 (features, Some(hidden))
             }
-            (None, Some(merge)) => (merge.forward(compensated), None),
+            (None, Some(merge)) => (layer::convolved(merge, compensated), None),
             (None, None) => (compensated, None),
         };
         Plane {

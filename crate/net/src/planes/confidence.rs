@@ -8,7 +8,7 @@ use burn::tensor::{
     activation::{sigmoid, silu},
 };
 
-use super::layer::{ChannelNorm, pointwise};
+use super::layer::{ChannelNorm, convolved, pointwise};
 use super::scan::{SeparableScan, driving, rank};
 
 /// `R = conf * (F + val)`, where `[val, logit conf] = MLP_E(scan(w^T F))`.
@@ -47,10 +47,9 @@ impl ConfidenceEncoding {
         let channels = features.dims()[1];
         let states = self
             .scan
-            .forward(self.drive.forward(features.clone()), features.clone());
-        let read = self
-            .readout
-            .forward(silu(self.widen.forward(self.norm.forward(states))));
+            .forward(convolved(&self.drive, features.clone()), features.clone());
+        let wide = silu(convolved(&self.widen, self.norm.forward(states)));
+        let read = convolved(&self.readout, wide);
         let value = read.clone().narrow(1, 0, channels);
         let confidence = sigmoid(read.narrow(1, channels, 1));
         ((features + value) * confidence.clone(), confidence)

@@ -6,7 +6,7 @@ use burn::nn::conv::Conv2d;
 use burn::nn::{Initializer, Linear, LinearConfig};
 use burn::tensor::{Device, Tensor};
 
-use super::layer::{ChannelNorm, pointwise, pooled};
+use super::layer::{ChannelNorm, convolved, pointwise, pooled};
 use super::scan::{SeparableScan, rank};
 
 /// `State = scan(project(CR)) + B(CR)`, `S = out(State)`, `Q = W_s S + W_f F + b`.
@@ -40,15 +40,15 @@ impl SpatialDecoding {
     /// `compensated` `[V, C or 2C, h, w]` and the features before all parts `[V, C, h, w]` to `Q` `[V, C, h, w]`.
     pub fn forward(&self, compensated: Tensor<4>, features: Tensor<4>) -> Tensor<4> {
         let spatial = self.spatial(compensated);
-        self.lift.forward(Tensor::cat(vec![spatial, features], 1))
+        convolved(&self.lift, Tensor::cat(vec![spatial, features], 1))
     }
 
     /// `S`, `[V, C, h, w]`.
     pub fn spatial(&self, compensated: Tensor<4>) -> Tensor<4> {
         let shift = self.shift.forward(pooled(compensated.clone()));
         let [views, states] = shift.dims();
-        let input = self.project.forward(self.norm.forward(compensated.clone()));
+        let input = convolved(&self.project, self.norm.forward(compensated.clone()));
         let state = self.scan.forward(input, compensated) + shift.reshape([views, states, 1, 1]);
-        self.out.forward(state)
+        convolved(&self.out, state)
     }
 }

@@ -3,7 +3,11 @@
 use burn::module::{Module, Param};
 use burn::nn::conv::{Conv2d, Conv2dConfig};
 use burn::nn::{BatchNorm, BatchNormConfig, Initializer, PaddingConfig2d};
-use burn::tensor::{Device, Tensor, activation::relu};
+use burn::tensor::{Device, Tensor};
+
+use crate::ops::batch_norm::batch_norm;
+use crate::ops::depthwise::depthwise;
+use crate::ops::pointwise::pointwise as linear;
 
 /// A linear layer of each pixel's channels, with bias, as a 1x1 convolution.
 pub(super) fn pointwise(channels_in: usize, channels_out: usize) -> Conv2dConfig {
@@ -25,6 +29,18 @@ pub(super) fn kaiming(fan_out_only: bool) -> Initializer {
     Initializer::KaimingNormal {
         gain: std::f64::consts::SQRT_2,
         fan_out_only,
+    }
+}
+
+/// What `conv` gives, by the operation that suits its shape.
+pub(super) fn convolved(conv: &Conv2d, x: Tensor<4>) -> Tensor<4> {
+    let weight = conv.weight.val();
+    if conv.kernel_size == [1, 1] {
+        linear(x, weight, conv.bias.as_ref().map(|bias| bias.val()))
+    } else if conv.groups > 1 {
+        depthwise(x, weight, conv.stride[0])
+    } else {
+        conv.forward(x)
     }
 }
 
@@ -74,8 +90,7 @@ impl ConvNorm {
     }
 
     pub(super) fn forward(&self, x: Tensor<4>) -> Tensor<4> {
-        let x = self.norm.forward(self.conv.forward(x));
-        if self.relu { relu(x) } else { x }
+        batch_norm(&self.norm, convolved(&self.conv, x), self.relu)
     }
 }
 

@@ -3,10 +3,11 @@
 use burn::module::Module;
 use burn::nn::conv::Conv2d;
 use burn::nn::{BatchNorm, BatchNormConfig};
-use burn::tensor::{Device, Tensor, activation::relu};
+use burn::tensor::{Device, Tensor};
 
-use super::layer::{centred, kaiming};
+use super::layer::{centred, convolved, kaiming};
 use crate::NetConfig;
+use crate::ops::batch_norm::batch_norm;
 use crate::ops::upsample::upsample2;
 
 /// Features at strides 16, 8, 4 to planes of `config.planes` channels.
@@ -81,6 +82,6 @@ impl NormConv {
     }
 
     fn forward(&self, x: Tensor<4>) -> Tensor<4> {
-        self.conv.forward(relu(self.norm.forward(x)))
+        convolved(&self.conv, batch_norm(&self.norm, x, true))
     }
 }

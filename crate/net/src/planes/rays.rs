@@ -8,7 +8,7 @@ use burn::nn::conv::Conv2d;
 use burn::tensor::{Device, Tensor, TensorData};
 use glam::Vec2;
 
-use super::layer::pointwise;
+use super::layer::{convolved, pointwise};
 use crate::{Level, View};
 
 /// Octaves of the encoding.
@@ -39,7 +39,7 @@ impl RayEncoding {
         let encoded = encoded(views, width, height, level.stride());
         let shape = [views.len(), CHANNELS, height, width];
         let encoded = Tensor::from_data(TensorData::new(encoded, shape), &features.device());
-        self.mix.forward(Tensor::cat(vec![features, encoded], 1))
+        convolved(&self.mix, Tensor::cat(vec![features, encoded], 1))
     }
 }
 

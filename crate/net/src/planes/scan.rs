@@ -6,7 +6,7 @@ use burn::nn::conv::Conv2d;
 use burn::nn::{Initializer, conv::Conv2dConfig};
 use burn::tensor::{Device, Distribution, Tensor, activation::softplus};
 
-use super::layer::{of_channels, pointwise};
+use super::layer::{convolved, of_channels, pointwise};
 use crate::ops::linrec::linrec;
 
 /// Along rows, then along columns, each in both directions. With constant steps this is
@@ -80,7 +80,8 @@ impl Pass {
 
     /// The step `d > 0` of each state at each pixel.
     fn step(&self, features: Tensor<4>) -> Tensor<4> {
-        softplus(self.expand.forward(self.reduce.forward(features)), 1.0)
+        let low = convolved(&self.reduce, features);
+        softplus(convolved(&self.expand, low), 1.0)
     }
 
     /// `u < 0`, to be broadcast.

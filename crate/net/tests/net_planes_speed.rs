@@ -1,0 +1,151 @@
+//! Where the time of the planes goes on the processor, forward and backward:
+//! `cargo test --release --workspace --test net_planes_speed -- --ignored --nocapture`.
+
+#![cfg(not(target_family = "wasm"))]
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+mod common;
+
+use std::time::Instant;
+
+use burn::tensor::{Device, Distribution, Tensor};
+use glam::Affine3A;
+use mesh::camera::Pinhole;
+use net::planes::PlaneNet;
+use net::{Level, NetConfig, View};
+
+const VIEWS: usize = 8;
+
+/// Milliseconds of the fastest of some runs, forward and backward; the gradient starts as ones everywhere.
+fn timed(
+    inputs: &[[usize; 4]],
+    device: &Device,
+    run: impl Fn(Vec<Tensor<4>>) -> Vec<Tensor<4>>,
+) -> [f64; 2] {
+    let mut best = [f64::INFINITY; 2];
+    for _ in 0..5 {
+        let inputs = inputs
+            .iter()
+            .map(|shape| {
+                Tensor::random(*shape, Distribution::Normal(0.0, 1.0), device).require_grad()
+            })
+            .collect();
+        let start = Instant::now();
+        let outputs = run(inputs);
+        let forward = start.elapsed().as_secs_f64();
+        let loss = outputs
+            .into_iter()
+            .map(Tensor::sum)
+            .reduce(|a, b| a + b)
+            .unwrap();
+        let start = Instant::now();
+        let _ = loss.backward();
+        let backward = start.elapsed().as_secs_f64();
+        best[0] = best[0].min(forward * 1e3);
+        best[1] = best[1].min(backward * 1e3);
+    }
+    best
+}
+
+#[test]
+#[ignore = "a measurement"]
+fn shares() {
+    let device = Device::flex().autodiff();
+    for (name, config) in [("small", NetConfig::small()), ("full", NetConfig::full())] {
+        for (width, height) in [(160, 120), (320, 240)] {
+            let net = PlaneNet::init(&config, &device);
+            let camera = Pinhole {
+                width: width as u32,
+                height: height as u32,
+                fx: width as f32,
+                fy: width as f32,
+                cx: width as f32 / 2.0,
+                cy: height as f32 / 2.0,
+            };
+            let views = vec![
+                View {
+                    camera,
+                    world_from_camera: Affine3A::IDENTITY,
+                };
+                VIEWS
+            ];
+            let at = |channels: usize, level: Level| {
+                let [w, h] = net::planes::plane_size(width, height, level);
+                [VIEWS, channels, h, w]
+            };
+            println!("{name}, {VIEWS} views of {width} x {height}: forward, backward in ms");
+            let report = |part: &str, [f, b]: [f64; 2]| println!("  {part:24} {f:8.2} {b:8.2}");
+            let image = [VIEWS, 3, height, width];
+            report(
+                "whole",
+                timed(&[image], &device, |x| {
+                    let planes = net.forward(x.into_iter().next().unwrap(), &views);
+                    let parts = planes.map(|p| [Some(p.base), p.hidden, p.confidence]);
+                    parts.into_iter().flatten().flatten().collect()
+                }),
+            );
+            report(
+                "backbone",
+                timed(&[image], &device, |x| {
+                    net.backbone.forward(x.into_iter().next().unwrap()).to_vec()
+                }),
+            );
+            let b = config.backbone;
+            let strided = [
+                at(b[4], Level::Coarse),
+                at(b[3], Level::Medium),
+                at(b[2], Level::Fine),
+            ];
+            report(
+                "pyramid",
+                timed(&strided, &device, |x| {
+                    net.pyramid.forward(x.try_into().unwrap()).to_vec()
+                }),
+            );
+            for level in Level::ALL {
+                let channels = config.planes[level as usize];
+                let parts = &net.levels[level as usize];
+                let shape = at(channels, level);
+                let one = |x: Vec<Tensor<4>>| x.into_iter().next().unwrap();
+                report(
+                    &format!("{level:?} rays"),
+                    timed(&[shape], &device, |x| {
+                        vec![parts.rays.forward(one(x), &views, level)]
+                    }),
+                );
+                report(
+                    &format!("{level:?} pce"),
+                    timed(&[shape], &device, |x| {
+                        let (r, c) = parts.pce.as_ref().unwrap().forward(one(x));
+                        vec![r, c]
+                    }),
+                );
+                report(
+                    &format!("{level:?} acm"),
+                    timed(&[shape], &device, |x| {
+                        vec![parts.acm.as_ref().unwrap().forward(one(x))]
+                    }),
+                );
+                report(
+                    &format!("{level:?} ipsd"),
+                    timed(&[at(2 * channels, level), shape], &device, |x| {
+                        let [cr, f]: [Tensor<4>; 2] = x.try_into().unwrap();
+                        vec![parts.ipsd.as_ref().unwrap().forward(cr, f)]
+                    }),
+                );
+            }
+        }
+    }
+}
+
+#[test]
+#[ignore = "a measurement"]
+fn backbone_only() {
+    let device = Device::flex().autodiff();
+    let net = PlaneNet::init(&NetConfig::small(), &device);
+    for _ in 0..8 {
+        timed(&[[VIEWS, 3, 240, 320]], &device, |x| {
+            net.backbone.forward(x.into_iter().next().unwrap()).to_vec()
+        });
+    }
+}
