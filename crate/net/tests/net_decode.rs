@@ -1,77 +1,239 @@
-//! The sparse U-Net of a level and its head.
+//! The sparse network of a level, against tests/reference/net_decode.py and against the method's counts.
 
-#![cfg(not(target_family = "wasm"))]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+#[macro_use]
 mod common;
 
-use burn::{Tensor, module::Module, tensor::Device};
+use burn::{
+    Tensor,
+    module::{Module, ModuleVisitor, Param},
+    tensor::{Device, Gradients, TensorData},
+};
+use common::{devices::values, filled, numbers};
 use glam::{IVec3, ivec3};
 use net::{
     NetConfig,
-    decode::{DecoderConfig, UNetMaps},
+    decode::{
+        Decoder, DecoderConfig, UNetMaps, halved,
+        maps::{pooling, submanifold},
+        unet::Residual,
+    },
+    ops::sparse_conv::{KernelMap, sparse_conv},
 };
+use serde_json::Value;
 
+const CONFIG: DecoderConfig = DecoderConfig { inputs: 5, base: 3 };
+
+/// Half of a box, in no order, and a few far from it.
 fn sites() -> Vec<IVec3> {
-    let all = (0..11 * 9 * 7).map(|i| ivec3(i % 11 - 5, i / 11 % 9 - 3, i / 99 - 4));
-    all.filter(|s| (s.x * s.y + 3 * s.z + s.x).rem_euclid(5) < 2)
-        .collect()
+    let chosen = numbers("sites", 11 * 9 * 7, 1.0);
+    let mut order: Vec<usize> = (0..chosen.len()).filter(|i| chosen[*i] < 0.1).collect();
+    order.sort_by(|a, b| chosen[*a].total_cmp(&chosen[*b]));
+    let place = |i: usize| ivec3((i % 11) as i32, (i / 11 % 9) as i32, (i / 99) as i32);
+    let mut sites: Vec<_> = order.iter().map(|i| place(*i) - ivec3(5, 4, 3)).collect();
+    sites.extend([
+        ivec3(-41, 26, -17),
+        ivec3(-41, 26, -16),
+        ivec3(100, -100, 3),
+    ]);
+    sites
 }
 
-#[test]
-fn parameters_are_as_counted() {
-    let config = NetConfig::full();
-    let inputs = [80, 137, 73];
-    let counted = [4_499_425, 1_167_905, 293_521];
-    for level in 0..3 {
-        let config = DecoderConfig {
-            inputs: inputs[level],
-            base: config.unet[level],
+fn made<const D: usize>(name: &str, shape: [usize; D], scale: f32, device: &Device) -> Tensor<D> {
+    let values = numbers(name, shape.iter().product(), scale);
+    Tensor::from_data(TensorData::new(values, shape), device)
+}
+
+fn features(device: &Device) -> Tensor<2> {
+    made("features", [sites().len(), CONFIG.inputs], 1.0, device)
+}
+
+/// The reference's numbers.
+struct Golden(Value);
+
+impl Golden {
+    fn read() -> Self {
+        let text = include_str!("../../../tests/golden/net_decode.json");
+        Self(serde_json::from_str(text).unwrap())
+    }
+
+    /// Shape, every k-th number and the sum of all must be the reference's.
+    fn assert(&self, name: &str, dims: &[usize], found: &[f32]) {
+        let expected = &self.0[name];
+        assert!(expected.is_object(), "the reference has no {name}");
+        let numbers = |key: &str| -> Vec<f32> {
+            let array = expected[key].as_array().unwrap();
+            array.iter().map(|v| v.as_f64().unwrap() as f32).collect()
         };
-        let decoder = config.init(&Device::flex());
-        let running =
-            |(name, data): &(String, burn::tensor::TensorData)| match name.contains("running") {
-                true => 0,
-                false => data.shape().iter().product(),
-            };
-        let found: usize = net::named::tensors(&decoder).iter().map(running).sum();
-        assert_eq!(found, counted[level]);
+        let shape: Vec<f32> = dims.iter().map(|&d| d as f32).collect();
+        assert_eq!(shape, numbers("shape"), "{name}");
+        let every = expected["every"].as_u64().unwrap() as usize;
+        let some: Vec<f32> = found.iter().step_by(every).copied().collect();
+        let off = common::relative_error(&some, &numbers("values"));
+        assert!(off < 1e-4, "{name}: {off:e}");
+        let sum: f64 = found.iter().map(|v| f64::from(*v)).sum();
+        let number = |key: &str| expected[key].as_f64().unwrap();
+        let off = (sum - number("sum")).abs() / number("magnitude");
+        assert!(off < 1e-4, "sum of {name}: {off:e}");
+    }
+
+    async fn assert_tensor<const D: usize>(&self, name: &str, found: Tensor<D>) {
+        let dims = found.dims();
+        self.assert(name, &dims, &values(found).await);
+    }
+
+    fn assert_sites(&self, name: &str, found: &[IVec3]) {
+        let flat: Vec<f32> = found
+            .iter()
+            .flat_map(|s| s.to_array())
+            .map(|c| c as f32)
+            .collect();
+        self.assert(name, &[found.len(), 3], &flat);
     }
 }
 
-#[test]
-fn every_parameter_has_a_gradient() {
-    let device = Device::flex().autodiff();
-    let sites = sites();
-    let decoder = DecoderConfig { inputs: 5, base: 4 }.init(&device);
-    let maps = UNetMaps::new(&sites, &device);
-    let input = common::numbers("input", 5 * sites.len(), 1.0);
-    let input = burn::tensor::TensorData::new(input, [sites.len(), 5]);
-    let (features, logit) = decoder.forward(Tensor::from_data(input, &device), &maps);
-    assert_eq!(features.dims(), [sites.len(), 12]);
-    assert_eq!(logit.dims(), [sites.len()]);
-    let gradients = (features.powi_scalar(2).sum() + logit.sum()).backward();
-    struct Check<'a>(&'a burn::tensor::Gradients, usize);
-    impl burn::module::ModuleVisitor for Check<'_> {
-        fn visit_float<const D: usize>(&mut self, param: &burn::module::Param<Tensor<D>>) {
-            if param.val().is_require_grad() {
-                let gradient = param.val().grad(self.0).expect("a gradient");
-                assert!(gradient.abs().sum().into_scalar::<f32>() > 0.0);
-                self.1 += 1;
-            }
-        }
-    }
-    let mut check = Check(&gradients, 0);
-    decoder.visit(&mut check);
-    println!("{} tensors", check.1);
+#[cfg_attr(target_family = "wasm", wasm_bindgen_test::wasm_bindgen_test)]
+#[cfg_attr(not(target_family = "wasm"), test)]
+fn sites_are_the_reference_s() {
+    Golden::read().assert_sites("sites", &sites());
+    Golden::read().assert_sites("halved", &halved(&sites()));
 }
 
-#[test]
-fn no_sites_give_no_rows() {
-    for device in [Device::flex(), Device::flex().autodiff()] {
-        let decoder = DecoderConfig { inputs: 5, base: 4 }.init(&device);
+on_each_device! {
+    async fn convolutions_are_the_reference_s(device: Device) {
+        let golden = Golden::read();
+        let sites = sites();
+        let halves = halved(&sites);
+        let conv = |name, features, map: &KernelMap, taps: usize| {
+            // As `filled` makes weights.
+            let scale = (3.0_f32 / 20.0).sqrt();
+            sparse_conv(features, made(name, [taps, 5, 4], scale, &device), map)
+        };
+        let same = submanifold(&sites, &device);
+        golden.assert_tensor("same", conv("same", features(&device), &same, 27)).await;
+        let down = pooling(&sites, &halves, &device);
+        golden.assert_tensor("down", conv("down", features(&device), &down, 8)).await;
+        let halves = made("halves", [halves.len(), 5], 1.0, &device);
+        golden.assert_tensor("up", conv("up", halves, &down.transposed(), 8)).await;
+    }
+}
+
+/// Blocks and the whole on a device, whose batch normalisation takes the statistics `named`.
+async fn assert_networks(device: Device, named: &str) {
+    let golden = Golden::read();
+    let maps = UNetMaps::new(&sites(), &device);
+    let residual = |outputs| {
+        let block = filled(Residual::new(CONFIG.inputs, outputs, &device));
+        block.forward(features(&device), &maps.same[0])
+    };
+    golden
+        .assert_tensor(&format!("residual.wider.{named}"), residual(7))
+        .await;
+    golden
+        .assert_tensor(&format!("residual.same.{named}"), residual(5))
+        .await;
+    let decoder = filled(CONFIG.init(&device));
+    let (features, logit) = decoder.forward(features(&device), &maps);
+    golden
+        .assert_tensor(&format!("features.{named}"), features)
+        .await;
+    golden.assert_tensor(&format!("logit.{named}"), logit).await;
+}
+
+on_each_device! {
+    async fn networks_are_the_reference_s(device: Device) {
+        assert_networks(device, "running").await;
+    }
+}
+
+#[cfg(not(target_family = "wasm"))]
+on_each_device! {
+    async fn networks_in_training_are_the_reference_s(device: Device) {
+        assert_networks(device.autodiff(), "batch").await;
+    }
+}
+
+on_each_device! {
+    async fn no_sites_give_no_rows(device: Device) {
+        let decoder = CONFIG.init(&device);
         let maps = UNetMaps::new(&[], &device);
         let (features, logit) = decoder.forward(Tensor::zeros([0, 5], &device), &maps);
-        assert_eq!((features.dims(), logit.dims()), ([0, 12], [0]));
+        assert_eq!((features.dims(), logit.dims()), ([0, 9], [0]));
+    }
+}
+
+on_each_device! {
+    /// One site alone has no neighbours, and is its own half.
+    async fn one_site_gives_one_row(device: Device) {
+        let decoder = filled(CONFIG.init(&device));
+        let maps = UNetMaps::new(&[ivec3(-1, 7, 2)], &device);
+        let (features, logit) = decoder.forward(Tensor::ones([1, 5], &device), &maps);
+        assert_eq!((features.dims(), logit.dims()), ([1, 9], [1]));
+        assert!(values(logit).await[0].is_finite());
+    }
+}
+
+#[cfg_attr(target_family = "wasm", wasm_bindgen_test::wasm_bindgen_test)]
+#[cfg_attr(not(target_family = "wasm"), test)]
+fn parameters_are_the_method_s() {
+    let config = NetConfig::full();
+    // Method 2.1.
+    let counted = [(80, 4_499_425), (137, 1_167_905), (73, 293_521)];
+    for ((inputs, counted), base) in counted.into_iter().zip(config.unet) {
+        let decoder = DecoderConfig { inputs, base }.init(&Device::flex());
+        let tensors = net::named::tensors(&decoder);
+        let learned = tensors.iter().filter(|(path, _)| !path.contains("running"));
+        let found: usize = learned.map(|(_, data)| data.num_elements()).sum();
+        assert_eq!(found, counted);
+    }
+}
+
+/// The gradients of a decoder's parameters, in their order.
+#[cfg(not(target_family = "wasm"))]
+struct Collected<'a>(&'a Gradients, Vec<Vec<f32>>);
+
+#[cfg(not(target_family = "wasm"))]
+impl ModuleVisitor for Collected<'_> {
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        if param.val().is_require_grad() {
+            let gradient = param.val().grad(self.0).expect("a gradient");
+            self.1.push(pollster::block_on(values(gradient)));
+        }
+    }
+}
+
+#[cfg(not(target_family = "wasm"))]
+fn gradients(device: Device) -> Vec<Vec<f32>> {
+    let device = device.autodiff();
+    let decoder: Decoder = filled(CONFIG.init(&device));
+    let maps = UNetMaps::new(&sites(), &device);
+    // Features with which no ReLU is nearer than 8e-5 to its kink: there rounding would decide.
+    let features = made("given", [sites().len(), CONFIG.inputs], 1.0, &device);
+    let (features, logit) = decoder.forward(features, &maps);
+    let gradients = (features.powi_scalar(2).sum() + logit.powi_scalar(2).sum()).backward();
+    let mut collected = Collected(&gradients, Vec::new());
+    decoder.visit(&mut collected);
+    let learned = |(path, _): &&(String, TensorData)| !path.contains("running");
+    let expected = net::named::tensors(&decoder).iter().filter(learned).count();
+    assert_eq!(collected.1.len(), expected);
+    collected.1
+}
+
+#[cfg(not(target_family = "wasm"))]
+#[test]
+fn every_parameter_has_a_gradient_alike_on_both_devices() {
+    let flex = gradients(Device::flex());
+    for gradient in &flex {
+        let sum: f32 = gradient.iter().map(|v| v.abs()).sum();
+        assert!(sum > 0.0 && sum.is_finite());
+    }
+    let Some(gpu) = common::devices::gpu() else {
+        println!("skipped: no Vulkan, Metal or DirectX adapter on this machine");
+        return;
+    };
+    for (gpu, flex) in gradients(gpu).iter().zip(&flex) {
+        let off = common::relative_error(gpu, flex);
+        assert!(off < 1e-4, "{off:e}");
     }
 }
