@@ -28,6 +28,9 @@ pub struct Arguments {
     /// Folder in which each seed gets its own, room-000123; rooms that are there already are left as they are.
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
+    /// Depth with the noise and the reach of a sensor instead of exact depth.
+    #[arg(long)]
+    noisy_depth: bool,
     /// Threads that draw; all cores without it.
     #[arg(long, value_name = "COUNT")]
     threads: Option<usize>,
@@ -115,17 +118,22 @@ fn write_room(arguments: &Arguments, seed: u64, folder: &Path) -> Result<(), Fai
             path: part.join(&stem),
             error,
         };
-        let color = color_jpeg(&frame).map_err(|error| refused(error.to_string()))?;
+        let color =
+            color_jpeg(&frame, scan.quality()).map_err(|error| refused(error.to_string()))?;
         write(&format!("{stem}.color.jpg"), &color)?;
-        let depth = depth_png(&frame).map_err(|error| refused(error.to_string()))?;
+        let sensed = arguments
+            .noisy_depth
+            .then(|| scan.sensed(i, &frame.depth_m));
+        let depth_m = sensed.as_deref().unwrap_or(&frame.depth_m);
+        let depth = depth_png(&frame, depth_m).map_err(|error| refused(error.to_string()))?;
         write(&format!("{stem}.depth.png"), &depth)
     })?;
     fs::rename(&part, folder).map_err(|error| Failure::file("write", folder, error))
 }
 
-fn color_jpeg(frame: &Frame) -> Result<Vec<u8>, jpeg_encoder::EncodingError> {
+fn color_jpeg(frame: &Frame, quality: u8) -> Result<Vec<u8>, jpeg_encoder::EncodingError> {
     let mut bytes = Vec::new();
-    jpeg_encoder::Encoder::new(&mut bytes, 92).encode(
+    jpeg_encoder::Encoder::new(&mut bytes, quality).encode(
         frame.color.as_flattened(),
         frame.width as u16,
         frame.height as u16,
@@ -135,9 +143,8 @@ fn color_jpeg(frame: &Frame) -> Result<Vec<u8>, jpeg_encoder::EncodingError> {
 }
 
 /// Whole millimetres in 16 bits.
-fn depth_png(frame: &Frame) -> Result<Vec<u8>, png::EncodingError> {
-    let bytes: Vec<u8> = frame
-        .depth_m
+fn depth_png(frame: &Frame, depth_m: &[f32]) -> Result<Vec<u8>, png::EncodingError> {
+    let bytes: Vec<u8> = depth_m
         .iter()
         .flat_map(|z| ((z * 1000.0 + 0.5) as u16).to_be_bytes())
         .collect();

@@ -73,16 +73,26 @@ pub(crate) struct Builder {
     pub solids: Vec<Solid>,
     pub random: Random,
     pub palette: Palette,
+    /// What wooden things are drawn with.
+    pub grain: Pattern,
+    /// What cloth is drawn with.
+    pub weave: Pattern,
 }
 
 impl Builder {
     pub fn new(seed: u64) -> Self {
         let mut random = Random::new(seed);
         let palette = Palette::pick(&mut random);
+        Self::with(random, palette)
+    }
+
+    pub fn with(random: Random, palette: Palette) -> Self {
         Self {
             solids: Vec::new(),
             random,
             palette,
+            grain: Pattern::Wood,
+            weave: Pattern::Weave,
         }
     }
 
@@ -159,11 +169,11 @@ impl Builder {
 
     pub fn wood(&self) -> Look {
         let [dark, light] = self.palette.wood;
-        Look::new(Pattern::Wood, [dark, light, light]).gloss(0.12)
+        Look::new(self.grain, [dark, light, light]).gloss(0.12)
     }
 
     pub fn cloth(&self, tones: [Vec3; 2]) -> Look {
-        Look::new(Pattern::Weave, [tones[0], tones[1], tones[1]])
+        Look::new(self.weave, [tones[0], tones[1], tones[1]])
     }
 
     pub fn accent(&mut self) -> Vec3 {

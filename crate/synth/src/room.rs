@@ -5,18 +5,16 @@ use std::f32::consts::PI;
 use glam::{Mat3, Vec3};
 
 use crate::builder::{Builder, Place};
-use crate::bvh::Bvh;
 use crate::palette::srgb;
+use crate::scene::Scene;
 use crate::shell::{Opening, door, floor_and_ceiling, wall, window};
-use crate::solid::{Solid, Touch};
 use crate::texture::{Look, Pattern};
 use crate::{furniture, seating, things};
 
 /// A living room in metres: floor at z = 0, Z up, the origin in the middle of the floor.
 #[derive(Clone, Debug)]
 pub struct Room {
-    pub(crate) solids: Vec<Solid>,
-    pub(crate) bvh: Bvh,
+    pub(crate) scene: Scene,
     pub(crate) size_m: Vec3,
     pub(crate) window: Light,
     pub(crate) lamp: Light,
@@ -31,13 +29,6 @@ pub(crate) struct Light {
     pub facing: Vec3,
     /// Linear RGB.
     pub power: Vec3,
-}
-
-/// Where a ray meets the room.
-pub(crate) struct Hit {
-    pub solid: u32,
-    pub t: f32,
-    pub normal: Vec3,
 }
 
 impl Room {
@@ -58,10 +49,8 @@ impl Room {
         }
         .quarter(quarter);
         let (window, lamp) = furnish(&mut b, &room, size);
-        let bvh = Bvh::new(&b.solids);
         Self {
-            solids: b.solids,
-            bvh,
+            scene: Scene::new(b.solids),
             size_m: if quarter.is_multiple_of(2) {
                 size
             } else {
@@ -79,37 +68,7 @@ impl Room {
 
     /// Signed distance in metres from `point` to the nearest surface: positive in free space, where it is exact.
     pub fn distance(&self, point: Vec3) -> f32 {
-        self.bvh
-            .nearest(point, |solid| self.solids[solid as usize].distance(point))
-    }
-
-    /// The first surface that the ray meets within `limit` metres; `dir` has unit length.
-    pub(crate) fn cast(&self, origin: Vec3, dir: Vec3, limit: f32) -> Option<Hit> {
-        let mut found = None;
-        self.bvh.walk_ray(origin, dir, limit, |solid, limit| {
-            match self.solids[solid as usize].cast(origin, dir, limit) {
-                Some(Touch { t, normal }) => {
-                    found = Some(Hit { solid, t, normal });
-                    t
-                }
-                None => limit,
-            }
-        });
-        found
-    }
-
-    /// Whether something that casts a shadow stands within `limit` metres of `origin` along `dir`.
-    pub(crate) fn blocked(&self, origin: Vec3, dir: Vec3, limit: f32) -> bool {
-        let mut blocked = false;
-        self.bvh.walk_ray(origin, dir, limit, |solid, limit| {
-            let solid = &self.solids[solid as usize];
-            if solid.casts_shadow && solid.cast(origin, dir, limit).is_some() {
-                blocked = true;
-                return 0.0;
-            }
-            limit
-        });
-        blocked
+        self.scene.distance(point)
     }
 }
 

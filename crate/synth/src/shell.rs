@@ -75,7 +75,7 @@ pub(crate) fn wall(
 }
 
 /// Frame boards around a hole, standing out by 2 cm, below as well if it is a window.
-fn casing(b: &mut Builder, at: &Place, hole: Opening, look: Look) {
+pub(crate) fn casing(b: &mut Builder, at: &Place, hole: Opening, look: Look) {
     let wide = 0.07;
     let top = hole.sill + hole.height;
     for side in [-1.0, 1.0] {
@@ -130,7 +130,7 @@ pub(crate) fn window(b: &mut Builder, at: &Place, hole: Opening) {
     curtains(b, at, hole);
 }
 
-fn radiator(b: &mut Builder, at: &Place, width: f32, height: f32) {
+pub(crate) fn radiator(b: &mut Builder, at: &Place, width: f32, height: f32) {
     let paint = Look::plain(srgb(0xEFEDE8)).gloss(0.35);
     let ribs = (width / 0.075) as u32;
     for i in 0..ribs {
@@ -153,7 +153,7 @@ fn radiator(b: &mut Builder, at: &Place, width: f32, height: f32) {
     }
 }
 
-fn curtains(b: &mut Builder, at: &Place, hole: Opening) {
+pub(crate) fn curtains(b: &mut Builder, at: &Place, hole: Opening) {
     let top = hole.sill + hole.height + 0.16;
     let reach = 0.5 * hole.width + 0.49;
     let tone = b.accent();

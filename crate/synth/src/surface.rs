@@ -25,7 +25,7 @@ impl Room {
     /// another the cut is as coarse as the cells.
     pub fn mesh(&self) -> Mesh {
         let mut mesh = Mesh::default();
-        for solid in &self.solids {
+        for solid in &self.scene.solids {
             match solid.shape {
                 Shape::Block { half_m, round_m } => {
                     self.add_block(&mut mesh, solid, half_m, round_m)

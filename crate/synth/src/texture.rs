@@ -4,6 +4,8 @@
 
 use glam::{Vec2, Vec3};
 
+use crate::material;
+use crate::picture::{art, outside, screen};
 use crate::random::{hash, hash_unit, noise};
 
 /// A pattern over three tones.
@@ -43,6 +45,42 @@ pub(crate) enum Pattern {
     Outside,
     /// Lines of text on a screen, on the x-z face.
     Screen,
+    /// One even tone.
+    Blank,
+    /// Square tiles of tones 0 to 1 with joints of tone 2; the seed says how they are laid.
+    Tiles,
+    /// Bricks of tones 0 to 1 with mortar of tone 2.
+    Bricks,
+    /// Squares of strips that lie across each other, tones 0 to 1.
+    Parquet,
+    /// Boards along z with grooves, tones 0 to 1.
+    Panels,
+    /// Loops of tones 0 and 1 with flecks of tone 2.
+    Carpet,
+    /// Veins of tones 1 and 2 in tone 0.
+    Marble,
+    /// Clouds and pores in tone 0.
+    Concrete,
+    /// Chips of all tones in tone 0.
+    Terrazzo,
+    /// A printed sheet: a picture, a title, lines of text.
+    Poster,
+    /// Land of tones 1 and 2 in a sea of tone 0.
+    Map,
+    /// Something like a photograph, in all tones.
+    Photo,
+    /// Wallpaper with leaves and flowers of tones 1 and 2.
+    Flowers,
+    /// Upright stripes of tones 0 and 1.
+    Bands,
+    /// Creased skin of tone 0.
+    Leather,
+    /// Fine scratches along x in tone 0.
+    Metal,
+    /// Spines of many books side by side along x.
+    Books,
+    /// Cloth of tones 0 and 1 with soft folds along z.
+    Folds,
 }
 
 /// What a solid looks like.
@@ -56,6 +94,10 @@ pub(crate) struct Look {
     /// Share of the colour that is given off without any light.
     pub glow: f32,
     pub seed: u32,
+    /// How much larger than life the pattern is.
+    pub scale: f32,
+    /// Place on the pattern of the solid's middle, in metres: parts of one wall share a pattern.
+    pub shift: Vec3,
 }
 
 impl Look {
@@ -66,6 +108,8 @@ impl Look {
             gloss: 0.0,
             glow: 0.0,
             seed: 0,
+            scale: 1.0,
+            shift: Vec3::ZERO,
         }
     }
 
@@ -81,6 +125,14 @@ impl Look {
         Self { glow, ..self }
     }
 
+    pub fn scale(self, scale: f32) -> Self {
+        Self { scale, ..self }
+    }
+
+    pub fn shift(self, shift: Vec3) -> Self {
+        Self { shift, ..self }
+    }
+
     pub fn seed(self, seed: u32) -> Self {
         Self { seed, ..self }
     }
@@ -90,6 +142,11 @@ impl Look {
     pub fn colour(&self, p: Vec3, normal: Vec3, half: Vec3, pixel_m: f32) -> Vec3 {
         let [a, b, c] = self.tones;
         let seed = self.seed;
+        let (p, half, pixel_m) = (
+            (p + self.shift) / self.scale,
+            half / self.scale,
+            pixel_m / self.scale,
+        );
         let fine = |period: f32| (1.0 - pixel_m / period).max(0.0);
         let uneven = |amount: f32, scale: f32| 1.0 + amount * (noise(p * scale, seed) - 0.5);
         let flat = unfold(p, normal);
@@ -183,12 +240,13 @@ impl Look {
             }
             Pattern::Outside => outside(p, half, seed),
             Pattern::Screen => screen(p, half, self),
+            _ => material::colour(self, p, normal, half, pixel_m),
         }
     }
 }
 
 /// The two coordinates along the face that `normal` belongs to.
-fn unfold(p: Vec3, normal: Vec3) -> Vec2 {
+pub(crate) fn unfold(p: Vec3, normal: Vec3) -> Vec2 {
     let n = normal.abs();
     if n.z >= n.x && n.z >= n.y {
         Vec2::new(p.x, p.y)
@@ -200,7 +258,7 @@ fn unfold(p: Vec3, normal: Vec3) -> Vec2 {
 }
 
 /// Share of a pixel that a line of `width` covers when its middle is `away`.
-fn stroke(away: f32, width: f32, pixel_m: f32) -> f32 {
+pub(crate) fn stroke(away: f32, width: f32, pixel_m: f32) -> f32 {
     let pixel = pixel_m.max(1e-4);
     ((0.5 * width - away.abs()) / pixel + 0.5).clamp(0.0, 1.0) * (width / pixel).min(1.0)
 }
@@ -279,99 +337,4 @@ fn rug(p: Vec3, half: Vec3, pixel_m: f32, look: &Look) -> Vec3 {
         }
     };
     tone * thread * worn
-}
-
-fn art(p: Vec3, half: Vec3, look: &Look) -> Vec3 {
-    let [a, b, c] = look.tones;
-    let uv = Vec2::new(p.x / half.x, p.z / half.z);
-    let canvas = 1.0 + 0.12 * (noise(p * 60.0, look.seed) - 0.5);
-    let tone = match look.seed % 3 {
-        0 => {
-            // Overlapping discs on a light ground.
-            let mut tone = Vec3::splat(0.78);
-            for i in 0..6 {
-                let at = |k| 1.5 * hash_unit(i, k, 7, look.seed) - 0.75;
-                let size = 0.16 + 0.34 * hash_unit(i, 2, 7, look.seed);
-                if (uv - Vec2::new(at(0), at(1))).length() < size {
-                    tone = tone * 0.15 + [a, b, c][(i % 3) as usize] * 0.85;
-                }
-            }
-            tone
-        }
-        1 => {
-            // Hills in front of each other under a sun.
-            let sky = Vec3::splat(0.8).lerp(c, 0.25 - 0.25 * uv.y);
-            let sun = (uv - Vec2::new(0.35, 0.5)).length() < 0.2;
-            let mut tone = if sun { c } else { sky };
-            for i in 0..4 {
-                let ridge = 0.25 - 0.35 * i as f32
-                    + 0.5 * (noise(Vec3::new(uv.x * 1.7, i as f32, 0.5), look.seed) - 0.3);
-                if uv.y < ridge {
-                    tone = b.lerp(a, i as f32 / 3.0) * (0.65 + 0.1 * i as f32);
-                }
-            }
-            tone
-        }
-        _ => {
-            // Soft-edged fields of colour.
-            let wave =
-                uv.y + 0.12 * (noise(Vec3::new(uv.x * 3.0, uv.y * 3.0, 0.0), look.seed) - 0.5);
-            let field = match wave {
-                w if w > 0.25 => a,
-                w if w > -0.15 => b,
-                _ => c,
-            };
-            let margin = uv.abs().max_element() > 0.84;
-            if margin { Vec3::splat(0.74) } else { field }
-        }
-    };
-    tone * canvas
-}
-
-fn outside(p: Vec3, half: Vec3, seed: u32) -> Vec3 {
-    let z = p.z / half.z;
-    let wave = |x: f32, y: f32, k: f32| noise(Vec3::new(p.x * x, p.z * y, k), seed);
-    let sky = Vec3::new(0.97, 0.97, 0.95).lerp(
-        Vec3::new(0.52, 0.73, 0.98),
-        (0.35 + 0.65 * z).clamp(0.0, 1.0),
-    );
-    let cloud = 1.5 * (0.65 * wave(1.8, 4.0, 0.0) + 0.35 * wave(5.0, 11.0, 2.0) - 0.45).max(0.0);
-    let sky = sky.lerp(Vec3::ONE, cloud.min(1.0));
-    // Two rows of trees; crowns are lumps of three sizes, and the far row is hazier.
-    let crown = |x: f32, k: f32| {
-        0.6 * wave(x, 0.0, k) + 0.3 * wave(3.0 * x, 3.0, k + 1.0) + 0.1 * wave(24.0, 24.0, k)
-    };
-    let leaves = 0.72 + 0.3 * wave(9.0, 9.0, 6.0) + 0.22 * wave(40.0, 40.0, 7.0);
-    if z < -0.95 + 0.75 * crown(2.3, 10.0) {
-        Vec3::new(0.30, 0.42, 0.17) * leaves
-    } else if z < -0.62 + 0.9 * crown(1.3, 20.0) {
-        Vec3::new(0.50, 0.61, 0.42) * (0.5 + 0.5 * leaves)
-    } else {
-        sky
-    }
-}
-
-fn screen(p: Vec3, half: Vec3, look: &Look) -> Vec3 {
-    let [back, ink, accent] = look.tones;
-    let u = 0.5 + 0.5 * p.x / half.x;
-    let z = 0.5 - 0.5 * p.z / half.z;
-    if z < 0.07 {
-        return accent * 0.5;
-    }
-    if u < 0.18 {
-        return back.lerp(accent, 0.2);
-    }
-    let line = (z * 22.0).floor();
-    let inside = (z * 22.0).fract() < 0.55;
-    let indent = 0.2 + 0.05 * (hash(line as i32, 0, 0, look.seed) % 4) as f32;
-    let end = indent + 0.12 + 0.5 * hash_unit(line as i32, 1, 0, look.seed);
-    if inside && u > indent && u < end {
-        let word = (u * 16.0).floor() as i32;
-        return if hash(line as i32, word, 2, look.seed).is_multiple_of(3) {
-            accent
-        } else {
-            ink
-        };
-    }
-    back
 }

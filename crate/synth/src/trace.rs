@@ -92,6 +92,7 @@ pub fn depth(room: &Room, view: &View) -> Vec<f32> {
     let mut depth_m = Vec::with_capacity(view.camera.width as usize * view.camera.height as usize);
     for_each_ray(view, |dir, length| {
         let t = room
+            .scene
             .cast(view.position_m, dir, FAR_M)
             .map_or(0.0, |hit| hit.t);
         depth_m.push(t / length);
@@ -112,13 +113,13 @@ fn for_each_ray(view: &View, mut visit: impl FnMut(Vec3, f32)) {
 
 fn look(room: &Room, view: &View, dir: Vec3) -> Point {
     let origin = view.position_m;
-    let Some(hit) = room.cast(origin, dir, FAR_M) else {
+    let Some(hit) = room.scene.cast(origin, dir, FAR_M) else {
         return Point {
             dir,
             ..Point::default()
         };
     };
-    let solid = &room.solids[hit.solid as usize];
+    let solid = &room.scene.solids[hit.solid as usize];
     let at = origin + dir * hit.t;
     // A slanting surface spreads over more metres a pixel.
     let slant = (-dir.dot(hit.normal)).max(0.25);
@@ -183,7 +184,7 @@ fn gather(room: &Room, point: &Point, probe: &Probe) -> Gathered {
             return 0.0;
         }
         let away = to.length();
-        if room.blocked(origin, to / away, away) {
+        if room.scene.blocked(origin, to / away, away) {
             0.0
         } else {
             1.0
@@ -197,11 +198,11 @@ fn gather(room: &Room, point: &Point, probe: &Probe) -> Gathered {
     let x = side.cross(point.normal).normalize_or(Vec3::X);
     let y = point.normal.cross(x);
     let dir = x * probe.dir.x + y * probe.dir.y + point.normal * probe.dir.z;
-    let around = match room.cast(origin, dir, BOUNCE_REACH_M) {
+    let around = match room.scene.cast(origin, dir, BOUNCE_REACH_M) {
         // What is near gives back the light of its own colour, and keeps the rest away.
         Some(hit) => {
             let near = 1.0 - hit.t / BOUNCE_REACH_M;
-            let look = &room.solids[hit.solid as usize].look;
+            let look = &room.scene.solids[hit.solid as usize].look;
             let tone = look.tones[0].lerp(look.tones[1], 0.5);
             let bounced = tone * (0.30 + 0.5 * look.glow);
             surroundings(dir).lerp(bounced, near.sqrt())
@@ -269,7 +270,7 @@ fn average(
 
 /// Linear RGB that leaves `point` towards the camera.
 fn shade(room: &Room, point: &Point, light: &Gathered) -> Vec3 {
-    let look = &room.solids[point.solid as usize].look;
+    let look = &room.scene.solids[point.solid as usize].look;
     let mut diffuse = light.around;
     let mut shine = Vec3::ZERO;
     for (source, seen) in [(&room.window, light.window), (&room.lamp, light.lamp)] {
