@@ -13,4 +13,4 @@ pub use net::Level;
 pub use plan::{
     DepthSource, Limits, NetworkConfig, Options, Plan, PlanError, Preset, ViewChoice, plan,
 };
-pub use run::{Decoded, Network, Outcome, RunError, reconstruct, run};
+pub use run::{Input, Network, Outcome, RunError, reconstruct, run};

@@ -13,7 +13,7 @@ use ::stereo::StereoError;
 use burn::tensor::Device;
 use glam::{Affine3A, Vec3};
 use mesh::camera::Pinhole;
-pub use neural::{Decoded, Network};
+pub use neural::{Input, Network};
 use scan::{ColorImage, Scan};
 use volume::{DepthView, Volume, VolumeError};
 

@@ -13,9 +13,9 @@ use burn::{
 use common::{Recorder, SEED, color_alone, files, open, sample};
 use glam::{DAffine3, IVec3, Vec3};
 use mesh::Mesh;
-use net::View;
+use net::{View, model::Decoded};
 use recon::{
-    Decoded, DepthSource, Level, Limits, Network, NetworkConfig, Options, Outcome, PlanError,
+    DepthSource, Input, Level, Limits, Network, NetworkConfig, Options, Outcome, PlanError,
     RunError, Stage, ViewChoice,
     evaluate::{Protocol, evaluate},
 };
@@ -125,31 +125,28 @@ impl Network for Oracle {
         self.column(sites.iter().map(|&site| mark(site)).collect())
     }
 
-    fn decode(
-        &self,
-        level: Level,
-        features: Tensor<2>,
-        sites: &[IVec3],
-        origin_m: Vec3,
-    ) -> Decoded {
-        let [rows, columns] = features.dims();
-        assert_eq!(rows, sites.len());
-        let values: Vec<f32> = features.into_data().try_into_vec().unwrap();
-        let distances: Vec<f32> = sites
-            .iter()
-            .map(|site| self.distance_m(site.as_vec3() * level.voxel_size_m() + origin_m))
-            .collect();
-        for (row, site) in values.chunks(columns).zip(sites) {
-            if level == Level::Coarse {
-                assert_eq!(row, [mark(*site)], "what views say of the site");
-            } else {
-                // The parent's features, the site's own, the parent's logit.
-                let parent = site.div_euclid(IVec3::splat(2));
-                assert_eq!(row[..2], [mark(parent), mark(*site)]);
-                assert!(row[2] > 0.0, "an occupied parent");
-            }
+    fn guided(&self) -> bool {
+        false
+    }
+
+    fn decode(&self, level: Level, input: Input<'_>) -> Decoded {
+        let numbers = |tensor: Tensor<2>| tensor.into_data().try_into_vec::<f32>().unwrap();
+        let marks: Vec<f32> = input.sites.iter().map(|&site| mark(site)).collect();
+        assert_eq!(numbers(input.fused), marks, "what views say of the site");
+        assert_eq!(input.above.is_some(), level != Level::Coarse);
+        if let Some((above, rows)) = input.above {
+            let features = numbers(above.features.clone().select(0, rows.clone()));
+            let parents = input
+                .sites
+                .iter()
+                .map(|site| site.div_euclid(IVec3::splat(2)));
+            assert_eq!(features, parents.map(mark).collect::<Vec<f32>>());
+            let least = above.logit.clone().select(0, rows).min();
+            assert!(least.into_scalar::<f32>() > 0.0, "an occupied parent");
         }
-        let logit = |distance_m: &f32| match level {
+        let place = |site: &IVec3| site.as_vec3() * level.voxel_size_m() + input.origin_m;
+        let distances = input.sites.iter().map(|site| self.distance_m(place(site)));
+        let logit = |distance_m: f32| match level {
             Level::Fine => (distance_m / TRUNCATION_M / 1.05)
                 .clamp(-0.95, 0.95)
                 .atanh(),
@@ -157,9 +154,10 @@ impl Network for Oracle {
             // A child may lie anywhere from its parent to the next one.
             _ => TRUNCATION_M + 2.0 * level.voxel_size_m() - distance_m.abs(),
         };
+        let logits = distances.map(logit).collect();
         Decoded {
-            features: self.column(sites.iter().map(|&site| mark(site)).collect()),
-            logit: self.column(distances.iter().map(logit).collect()),
+            features: self.column(marks),
+            logit: self.column(logits).squeeze_dim(1),
         }
     }
 }

@@ -3,6 +3,7 @@
 
 mod color;
 mod explain;
+mod guide;
 mod levels;
 mod network;
 mod pictures;
@@ -16,7 +17,7 @@ use crate::{
 use burn::tensor::Device;
 use levels::Field;
 use net::Level;
-pub use network::{Decoded, Network};
+pub use network::{Input, Network};
 use pictures::Pictures;
 use scan::Scan;
 use tiles::Tiling;
@@ -65,7 +66,22 @@ pub(super) async fn fuse(
         });
     }
 
-    let field = levels::decode(&tiling, &pictures, network, device, sink).await;
+    let guide = match network.guided() {
+        false => None,
+        true => match guide::maps(scan, keyframes, device, sink).await? {
+            Some(maps) => Some(maps),
+            None => {
+                fusion.stopped = true;
+                return Ok(());
+            }
+        },
+    };
+    let scene = levels::Scene {
+        tiling: &tiling,
+        pictures: &pictures,
+        guide: guide.as_deref(),
+    };
+    let field = levels::decode(&scene, network, device, sink).await;
     let field = match field.map_err(|fault| explain::fault(fault, scan, keyframes))? {
         Some(field) => field,
         None => {

@@ -1,13 +1,20 @@
 //! Coarse to fine: what the views say of each tile's voxels, the 3D network over all of them, and those that go on.
 
-use super::{network::Network, pictures::Pictures, tiles::Tiling};
-use crate::event::{Flow, Sink, Stage};
-use burn::{
-    Tensor,
-    tensor::{DType, Device, Int, TensorData},
+use super::{
+    guide,
+    network::{Input, Network, rows},
+    pictures::Pictures,
+    tiles::Tiling,
 };
+use crate::event::{Flow, Sink, Stage};
+use burn::{Tensor, tensor::Device};
 use glam::IVec3;
-use net::{Level, View};
+use net::{
+    Level, View,
+    decode::children,
+    model::{Decoded, TSDF_SCALE},
+    sample::GuideMap,
+};
 use scan::{Finding, Severity};
 use std::ops::Range;
 
@@ -15,8 +22,6 @@ use std::ops::Range;
 const PAIRS_A_BLOCK: usize = 200_000;
 /// Voxels that a level may have, at most: 5,000 fine ones are a square metre of surface.
 const SITES_AT_MOST: [usize; 3] = [usize::MAX, 1 << 19, 1 << 21];
-/// The distance is this times the hyperbolic tangent of the fine level's logit (method 1.4).
-const TSDF_GAIN: f32 = 1.05;
 
 /// Why there is no field.
 pub(super) enum Fault {
@@ -39,54 +44,53 @@ pub(super) struct Field {
     pub distances: Vec<f32>,
 }
 
-/// What a level hands to the next one.
-struct Parents {
-    /// `[N, C]` of the parents, repeated for each child.
-    features: Tensor<2>,
-    /// `[N, 1]`, likewise.
-    logit: Tensor<2>,
+/// What the levels work on.
+pub(super) struct Scene<'a, P> {
+    /// The lattice and its tiles.
+    pub tiling: &'a Tiling,
+    /// Pictures' planes.
+    pub pictures: &'a Pictures<'a, P>,
+    /// Stereo's depth, where the network wants it.
+    pub guide: Option<&'a [GuideMap]>,
 }
 
 /// All three levels. `None` if the sink stopped it.
 pub(super) async fn decode<N: Network>(
-    tiling: &Tiling,
-    pictures: &Pictures<'_, N::Plane>,
+    scene: &Scene<'_, N::Plane>,
     network: &N,
     device: &Device,
     sink: &mut impl Sink,
 ) -> Result<Option<Field>, Fault> {
-    // Sites of all tiles, tile by tile: children keep their parents' order.
-    let mut sites: Vec<IVec3> = Vec::new();
-    let mut tiles: Vec<(Vec<usize>, Range<usize>)> = Vec::new();
-    for tile in &tiling.tiles {
-        let views = tile.views.iter().copied();
-        let views: Vec<usize> = views.filter(|&view| pictures.of(view).is_some()).collect();
-        if !views.is_empty() {
-            let start = sites.len();
-            sites.extend(tiling.sites(tile));
-            tiles.push((views, start..sites.len()));
-        }
-    }
-    let mut parents: Option<Parents> = None;
+    let origin_m = scene.tiling.origin_m;
+    let (mut tiles, mut sites) = coarse(scene);
+    let mut above: Option<(Decoded, Vec<i32>)> = None;
     for level in Level::ALL {
         let lattice = Lattice {
             level,
             sites: &sites,
             tiles: &tiles,
-            tiling,
         };
-        let Some(fused) = lattice.fuse(pictures, network, sink).await else {
+        let Some(fused) = lattice.fuse(scene, network, sink).await else {
             return Ok(None);
         };
-        let input = match parents {
-            None => fused,
-            Some(parents) => Tensor::cat(vec![parents.features, fused, parents.logit], 1),
-        };
-        let decoded = network.decode(level, input, &sites, tiling.origin_m);
+        let maps = scene.guide;
+        let parents = above.take();
+        let decoded = network.decode(
+            level,
+            Input {
+                sites: &sites,
+                origin_m,
+                fused,
+                above: parents
+                    .as_ref()
+                    .map(|(decoded, parents)| (decoded, rows(parents.clone(), device))),
+                guide: maps.map(|maps| guide::at(&sites, level, origin_m, maps, device)),
+            },
+        );
         let logits = read(decoded.logit.clone()).await?;
         sink.progress(lattice.blocks().len() + 1);
         if level == Level::Fine {
-            let distances = logits.iter().map(|&logit| TSDF_GAIN * logit.tanh());
+            let distances = logits.iter().map(|&logit| TSDF_SCALE * logit.tanh());
             return Ok(Some(Field {
                 distances: distances.collect(),
                 sites,
@@ -97,46 +101,59 @@ pub(super) async fn decode<N: Network>(
             let sites = sites.len();
             return Err(Fault::Nothing { level, sites });
         }
-        let children = kept.iter().flat_map(|&parent| [parent as i32; 8]);
-        let rows = TensorData::new(children.collect::<Vec<i32>>(), [8 * kept.len()]);
-        let rows = Tensor::<1, Int>::from_data(rows, (device, DType::I32));
-        parents = Some(Parents {
-            features: decoded.features.select(0, rows.clone()),
-            logit: decoded.logit.select(0, rows),
-        });
-        for (_, range) in &mut tiles {
+        for tile in &mut tiles {
             let of = |end: usize| 8 * kept.partition_point(|&site| site < end);
-            *range = of(range.start)..of(range.end);
+            tile.sites = of(tile.sites.start)..of(tile.sites.end);
         }
-        sites = kept
-            .iter()
-            .flat_map(|&site| children_of(sites[site]))
-            .collect();
+        let parents: Vec<IVec3> = kept.iter().map(|&site| sites[site]).collect();
+        sites = children(&parents);
+        let parents = kept.iter().flat_map(|&parent| [parent as i32; 8]);
+        above = Some((decoded, parents.collect()));
     }
     Ok(None)
 }
 
-/// The eight children of a site, x fastest.
-fn children_of(site: IVec3) -> impl Iterator<Item = IVec3> {
-    (0..8).map(move |child| 2 * site + IVec3::new(child & 1, child >> 1 & 1, child >> 2))
+/// A tile's views and its part of a level's sites.
+struct Part {
+    views: Vec<usize>,
+    sites: Range<usize>,
+}
+
+/// The coarse sites of all tiles, tile by tile: children keep their parents' order.
+fn coarse<P>(scene: &Scene<'_, P>) -> (Vec<Part>, Vec<IVec3>) {
+    let mut sites: Vec<IVec3> = Vec::new();
+    let mut tiles = Vec::new();
+    for tile in &scene.tiling.tiles {
+        let views = tile.views.iter().copied();
+        let views = views.filter(|&view| scene.pictures.of(view).is_some());
+        let views: Vec<usize> = views.collect();
+        if !views.is_empty() {
+            let start = sites.len();
+            sites.extend(scene.tiling.sites(tile));
+            tiles.push(Part {
+                views,
+                sites: start..sites.len(),
+            });
+        }
+    }
+    (tiles, sites)
 }
 
 /// A level's sites.
 struct Lattice<'a> {
     level: Level,
     sites: &'a [IVec3],
-    tiles: &'a [(Vec<usize>, Range<usize>)],
-    tiling: &'a Tiling,
+    tiles: &'a [Part],
 }
 
 impl Lattice<'_> {
     /// Pieces of work, in order: a tile and some of its sites.
     fn blocks(&self) -> Vec<(usize, Range<usize>)> {
         let mut blocks = Vec::new();
-        for (tile, (views, range)) in self.tiles.iter().enumerate() {
-            let step = (PAIRS_A_BLOCK / views.len()).max(1);
-            let starts = range.clone().step_by(step);
-            blocks.extend(starts.map(|start| (tile, start..(start + step).min(range.end))));
+        for (tile, part) in self.tiles.iter().enumerate() {
+            let step = (PAIRS_A_BLOCK / part.views.len()).max(1);
+            let starts = part.sites.clone().step_by(step);
+            blocks.extend(starts.map(|start| (tile, start..(start + step).min(part.sites.end))));
         }
         blocks
     }
@@ -144,7 +161,7 @@ impl Lattice<'_> {
     /// What the views say of every site: `[N, C]`. `None` if the sink stopped it.
     async fn fuse<N: Network>(
         &self,
-        pictures: &Pictures<'_, N::Plane>,
+        scene: &Scene<'_, N::Plane>,
         network: &N,
         sink: &mut impl Sink,
     ) -> Option<Tensor<2>> {
@@ -160,8 +177,8 @@ impl Lattice<'_> {
             let (plane, views) = match &mut current {
                 Some((at, plane, views)) if *at == tile => (plane, views),
                 other => {
-                    let views = self.tiles[tile].0.iter();
-                    let chosen = views.filter_map(|&view| pictures.of(view));
+                    let views = self.tiles[tile].views.iter();
+                    let chosen = views.filter_map(|&view| scene.pictures.of(view));
                     let chosen: Vec<_> = chosen.collect();
                     let planes: Vec<_> = chosen.iter().map(|p| p.plane(self.level)).collect();
                     let views = chosen.iter().map(|picture| picture.view).collect();
@@ -170,7 +187,7 @@ impl Lattice<'_> {
                 }
             };
             let sites = &self.sites[range];
-            let origin_m = self.tiling.origin_m;
+            let origin_m = scene.tiling.origin_m;
             fused.push(network.fuse(self.level, plane, views, sites, origin_m));
             sink.progress(done + 1);
         }
@@ -209,7 +226,7 @@ fn too_many(found: usize, sites: usize, limit: usize, level: Level) -> Finding {
     }
 }
 
-async fn read(logit: Tensor<2>) -> Result<Vec<f32>, Fault> {
+async fn read(logit: Tensor<1>) -> Result<Vec<f32>, Fault> {
     let data = logit.into_data_async().await;
     let data = data.map_err(|error| Fault::Device(error.to_string()))?;
     data.try_into_vec::<f32>()

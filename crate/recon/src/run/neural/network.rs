@@ -1,21 +1,24 @@
-//! What the driver asks of a network. Tests put one here that knows the truth.
+//! What the driver asks of a network: [`Ipdrecon`] is one. Tests put another here that knows the truth.
 
-use burn::Tensor;
+use burn::{
+    Tensor,
+    tensor::{Device, Int},
+};
 use glam::{IVec3, Vec3};
-use net::{Level, View};
-
-/// What a level's 3D network gives for each of its sites.
-pub struct Decoded {
-    /// `[N, C]`, for the next level.
-    pub features: Tensor<2>,
-    /// `[N, 1]`: above 0 where a surface is near (coarse, medium), or the argument of the distance's tanh (fine).
-    pub logit: Tensor<2>,
-}
+use net::{
+    Ipdrecon, Level, View,
+    fusion::{Pairs, Pooling},
+    model::Decoded,
+    planes::{Plane, plane_size},
+};
 
 /// A network as the driver of the reconstruction sees it. Site `s` of a level lies at `s * voxel_size_m + origin_m`.
 pub trait Network {
     /// What is kept of pictures at one level.
     type Plane;
+
+    /// Whether it wants stereo's depth as a guide.
+    fn guided(&self) -> bool;
 
     /// Feature planes of pictures `[V, 3, H, W]`, sRGB 0 to 255, from coarse to fine.
     fn planes(&self, images: Tensor<4>, views: &[View]) -> [Self::Plane; 3];
@@ -33,8 +36,75 @@ pub trait Network {
         origin_m: Vec3,
     ) -> Tensor<2>;
 
-    /// All sites of the scan at once. The columns of `features`: the parent's features, what views say, the parent's
-    /// logit; at the coarse level what views say alone.
-    fn decode(&self, level: Level, features: Tensor<2>, sites: &[IVec3], origin_m: Vec3)
-    -> Decoded;
+    /// The 3D network, over all sites of the scan at once.
+    fn decode(&self, level: Level, input: Input<'_>) -> Decoded;
+}
+
+/// What a level's 3D network works on.
+pub struct Input<'a> {
+    /// The sites.
+    pub sites: &'a [IVec3],
+    /// Where site 0 lies.
+    pub origin_m: Vec3,
+    /// What the views say of each: `[N, C]`.
+    pub fused: Tensor<2>,
+    /// The level above and each site's row in it.
+    pub above: Option<(&'a Decoded, Tensor<1, Int>)>,
+    /// The guide at each site `[N, 2]`, for a network that wants one.
+    pub guide: Option<Tensor<2>>,
+}
+
+impl Network for Ipdrecon {
+    type Plane = Plane;
+
+    fn guided(&self) -> bool {
+        self.config().guide
+    }
+
+    fn planes(&self, images: Tensor<4>, views: &[View]) -> [Plane; 3] {
+        Self::planes(self, images, views)
+    }
+
+    fn stack(&self, planes: &[&Plane]) -> Plane {
+        let all = |part: fn(&Plane) -> Option<Tensor<4>>| {
+            let parts: Option<Vec<_>> = planes.iter().map(|plane| part(plane)).collect();
+            parts.map(|parts| Tensor::cat(parts, 0))
+        };
+        let base = planes.iter().map(|plane| plane.base.clone());
+        Plane {
+            base: Tensor::cat(base.collect(), 0),
+            hidden: all(|plane| plane.hidden.clone()),
+            confidence: all(|plane| plane.confidence.clone()),
+        }
+    }
+
+    fn fuse(
+        &self,
+        level: Level,
+        plane: &Plane,
+        views: &[View],
+        sites: &[IVec3],
+        origin_m: Vec3,
+    ) -> Tensor<2> {
+        let size = views.first().map(|view| view.camera);
+        let size = size.map_or([0, 0], |camera| {
+            plane_size(camera.width as usize, camera.height as usize, level)
+        });
+        let (voxel_m, stride) = (level.voxel_size_m(), level.stride());
+        let pairs = Pairs::find(sites, voxel_m, origin_m, views, size, stride);
+        let pairs = pairs.on(&plane.base.device());
+        Self::fuse(self, level, plane, &pairs, Pooling::Softmax).features
+    }
+
+    fn decode(&self, level: Level, input: Input<'_>) -> Decoded {
+        let features = self.input(input.fused, input.above, input.guide);
+        Self::decode(self, level, features, input.sites)
+    }
+}
+
+/// Whole numbers as a tensor of row numbers.
+pub(super) fn rows(rows: Vec<i32>, device: &Device) -> Tensor<1, Int> {
+    use burn::tensor::{DType, TensorData};
+    let count = rows.len();
+    Tensor::from_data(TensorData::new(rows, [count]), (device, DType::I32))
 }

@@ -1,0 +1,74 @@
+//! Stereo's depth for networks that were trained with it as a guide.
+
+use crate::{
+    convert::{pinhole, pose},
+    event::{Flow, Sink, Stage},
+    run::RunError,
+};
+use burn::{
+    Tensor,
+    tensor::{DType, Device, TensorData},
+};
+use glam::{IVec3, Vec3};
+use net::{Level, View, guide::guide_channels, sample::GuideMap};
+use scan::{Finding, Scan};
+use stereo::{Step, StereoConfig};
+
+/// Depth with confidence of every keyframe that stereo can give some. `None` if the sink stopped it.
+pub(super) async fn maps(
+    scan: &Scan,
+    keyframes: &[usize],
+    device: &Device,
+    sink: &mut impl Sink,
+) -> Result<Option<Vec<GuideMap>>, RunError> {
+    sink.stage(Stage::Matching, keyframes.len());
+    let mut stereo = StereoConfig::default().init(scan, keyframes, device)?;
+    let mut maps = Vec::new();
+    let mut matched = 0;
+    let mut told: Vec<Finding> = Vec::new();
+    loop {
+        if sink.checkpoint().await == Flow::Stop {
+            return Ok(None);
+        }
+        match stereo.advance(scan).await? {
+            Step::Working => (),
+            Step::Matched => {
+                matched += 1;
+                sink.progress(matched);
+            }
+            Step::Depth(map) => {
+                sink.depth_map(&map);
+                maps.push(GuideMap {
+                    view: View {
+                        camera: pinhole(&map.camera),
+                        world_from_camera: pose(&scan.frames()[map.frame]),
+                    },
+                    depth_m: map.depth_m,
+                    confidence: map.confidence,
+                });
+            }
+            Step::Finding(finding) => {
+                if !told.contains(&finding) {
+                    sink.finding(finding.clone());
+                    told.push(finding);
+                }
+            }
+            Step::Done => break,
+        }
+    }
+    sink.progress(keyframes.len());
+    Ok(Some(maps))
+}
+
+/// What the maps say of a level's sites: `[N, 2]`.
+pub(super) fn at(
+    sites: &[IVec3],
+    level: Level,
+    origin_m: Vec3,
+    maps: &[GuideMap],
+    device: &Device,
+) -> Tensor<2> {
+    let channels = guide_channels(sites, level.voxel_size_m(), origin_m, maps);
+    let data = TensorData::new(channels.concat(), [sites.len(), 2]);
+    Tensor::from_data(data, (device, DType::F32))
+}
