@@ -38,6 +38,20 @@ pub enum Failure {
         /// Name of the scan.
         name: String,
     },
+    /// The network was asked for without its weights.
+    #[error(
+        "expected --weights FILE, found none: no trained network comes with this program yet; train one with `ipdrecon train`, \
+         or run `ipdrecon stereo`, which needs none"
+    )]
+    NoWeights,
+    /// A file that is not the network's weights.
+    #[error("{}: {error}", path.display())]
+    Weights {
+        /// Which file.
+        path: PathBuf,
+        /// What is wrong with it.
+        error: Box<net::weights::WeightsError>,
+    },
     /// The run went well, and there is no surface.
     #[error(
         "expected a surface, found none from {keyframes} keyframes, and no mesh is written; `ipdrecon doctor` looks into the scan for what may be wrong"

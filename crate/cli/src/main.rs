@@ -9,6 +9,8 @@ mod files;
 mod fuse;
 mod job;
 mod progress;
+mod reconstruct;
+mod size;
 mod stereo;
 mod synth;
 
@@ -30,6 +32,8 @@ enum Command {
     Fuse(fuse::Arguments),
     /// Make depth from the colour images of a scan, and a mesh from that.
     Stereo(stereo::Arguments),
+    /// Make a mesh from the colour images of a scan with a trained network.
+    Reconstruct(reconstruct::Arguments),
     /// Compare a mesh with ground truth, or depth maps with the sensor's depth.
     Eval(eval::Arguments),
     /// Look into a scan and say what is wrong with it.
@@ -42,6 +46,7 @@ fn main() -> ExitCode {
     let result: Result<(), Failure> = match Arguments::parse().command {
         Command::Fuse(arguments) => fuse::run(&arguments),
         Command::Stereo(arguments) => stereo::run(&arguments),
+        Command::Reconstruct(arguments) => reconstruct::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Synth(arguments) => synth::run(&arguments),

@@ -11,8 +11,22 @@ use burn::{
 };
 use glam::{IVec3, Vec3};
 use net::{Level, View, guide::guide_channels, sample::GuideMap};
-use scan::{Finding, Scan};
-use stereo::{Step, StereoConfig};
+use scan::{Finding, Scan, Severity};
+use stereo::{Step, StereoConfig, StereoError};
+
+fn without(least_m: f64, keyframes: usize) -> Finding {
+    Finding {
+        severity: Severity::Warning,
+        code: "no-guide",
+        file: None,
+        line: None,
+        expected: format!("pictures of the same things from places at least {least_m} m apart, to guide the network by stereo"),
+        found: format!("none among {keyframes} keyframes"),
+        advice: "The network goes without its guide, and finds less. Walk sideways while scanning instead of turning on the spot"
+            .to_owned(),
+        frames_affected: keyframes,
+    }
+}
 
 /// Depth with confidence of every keyframe that stereo can give some. `None` if the sink stopped it.
 pub(super) async fn maps(
@@ -22,7 +36,13 @@ pub(super) async fn maps(
     sink: &mut impl Sink,
 ) -> Result<Option<Vec<GuideMap>>, RunError> {
     sink.stage(Stage::Matching, keyframes.len());
-    let mut stereo = StereoConfig::default().init(scan, keyframes, device)?;
+    let mut stereo = match StereoConfig::default().init(scan, keyframes, device) {
+        Err(StereoError::NoParallax { least_m, .. }) => {
+            sink.finding(without(least_m, keyframes.len()));
+            return Ok(Some(Vec::new()));
+        }
+        other => other?,
+    };
     let mut maps = Vec::new();
     let mut matched = 0;
     let mut told: Vec<Finding> = Vec::new();

@@ -14,6 +14,8 @@ use std::{collections::BTreeSet, collections::BinaryHeap};
 
 /// Fine voxels along the edge of a coarse one.
 const FINE_A_COARSE: i32 = 4;
+/// Two keyframes that see the same from no farther than this overlap, in metres: rooms are about so large.
+const OVERLAP_M: f32 = 4.0;
 /// How much the seed may change what a keyframe adds: enough to break ties, too little to spoil the choice.
 const SEED_SHARE: f32 = 0.02;
 
@@ -35,11 +37,11 @@ pub(super) struct Tiling {
     pub size: IVec3,
     /// Tiles that some keyframe sees.
     pub tiles: Vec<Tile>,
-    /// Of each keyframe whether it sees, within reach, what another one sees too.
+    /// Of each keyframe whether it sees what another one sees too.
     shares: Vec<bool>,
 }
 
-/// A keyframe and the points of a tile that it sees, with how much each is worth.
+/// A keyframe and the points of a tile that it sees, with their depth in metres.
 struct Seen {
     keyframe: usize,
     points: Vec<(usize, f32)>,
@@ -97,12 +99,10 @@ impl Tiling {
             .collect();
         let seen = cameras.par_iter().enumerate().map(|(keyframe, camera)| {
             let depths = points.iter().map(|&point| camera.depth_m(point));
-            let points = depths.enumerate().filter_map(|(at, depth_m)| {
-                // What lies beyond reach is seen, but with coarser pixels.
-                let worth = (config.reach_m / depth_m?).min(1.0).powi(2);
-                Some((at, worth))
-            });
-            let points = points.collect();
+            let points = depths.enumerate();
+            let points = points
+                .filter_map(|(at, depth_m)| Some((at, depth_m?)))
+                .collect();
             Seen { keyframe, points }
         });
         let mut seen: Vec<Seen> = seen.collect();
@@ -124,7 +124,7 @@ impl Tiling {
 
     fn note_overlap(&mut self, seen: &[Seen], points: usize) {
         let near = |seen: &Seen| {
-            let near = seen.points.iter().filter(|(_, worth)| *worth >= 1.0);
+            let near = seen.points.iter().filter(|&&(_, z)| z <= OVERLAP_M);
             near.map(|&(at, _)| at).collect::<Vec<_>>()
         };
         let mut count = vec![0u8; points];
@@ -245,11 +245,11 @@ impl PartialOrd for Candidate {
 /// adds only shrinks as others are chosen, so that only the best candidate need be looked at again (Minoux 1978).
 fn by_coverage(seen: &[Seen], points: usize, config: &NetworkConfig) -> Vec<usize> {
     let mut covered = vec![0.0f32; points];
+    // What lies beyond reach is seen, but with coarser pixels.
+    let worth = |depth_m: f32| (config.reach_m / depth_m).min(1.0).powi(2);
     let gain = |seen: &Seen, covered: &[f32]| {
-        let adds = seen
-            .points
-            .iter()
-            .map(|&(at, worth)| worth / (1.0 + covered[at]));
+        let points = seen.points.iter();
+        let adds = points.map(|&(at, depth_m)| worth(depth_m) / (1.0 + covered[at]));
         let taste = unit(config.seed, seen.keyframe as u64);
         adds.sum::<f32>() * (1.0 + SEED_SHARE * taste)
     };
@@ -271,8 +271,8 @@ fn by_coverage(seen: &[Seen], points: usize, config: &NetworkConfig) -> Vec<usiz
             });
             continue;
         }
-        for &(at, worth) in &candidate.points {
-            covered[at] += worth;
+        for &(at, depth_m) in &candidate.points {
+            covered[at] += worth(depth_m);
         }
         views.push(candidate.keyframe);
     }
