@@ -3,7 +3,11 @@
 
 #[cfg(not(target_family = "wasm"))]
 mod backward;
+mod flex;
+mod register;
+mod tile;
 
+use super::flex as slices;
 use burn::{
     Tensor,
     backend::{
@@ -13,6 +17,7 @@ use burn::{
     tensor::{DType, Device, Int, Shape, TensorData},
 };
 use burn_cubecl::CubeBackend;
+use burn_flex::FlexTensor;
 
 /// Gathered rows take at most this much at a time: half of what WebGPU guarantees for a binding.
 const GATHERED_BYTES: usize = 64 << 20;
@@ -113,7 +118,48 @@ pub trait SparseConv: Backend {
     }
 }
 
-impl SparseConv for Flex {}
+impl SparseConv for Flex {
+    fn sparse_conv(
+        features: FlexTensor,
+        weight: FlexTensor,
+        gather: FlexTensor,
+        _scatter: FlexTensor,
+    ) -> FlexTensor {
+        let [taps, inputs, outputs] = weight.shape().dims();
+        let [rows, _] = features.shape().dims();
+        let [output_rows, _] = gather.shape().dims();
+        let gather = gather.to_contiguous();
+        let sizes = flex::Sizes {
+            taps,
+            rows,
+            inputs,
+            outputs,
+        };
+        let (features, weight) = (slices::read(features), slices::read(weight));
+        let output = flex::convolve(&features, &weight, gather.storage::<i32>(), sizes);
+        slices::tensor(output, Shape::new([output_rows, outputs]))
+    }
+
+    fn sparse_conv_weight_gradient(
+        features: FlexTensor,
+        gradient: FlexTensor,
+        gather: FlexTensor,
+    ) -> FlexTensor {
+        let [rows, inputs] = features.shape().dims();
+        let [_, outputs] = gradient.shape().dims();
+        let [_, taps] = gather.shape().dims();
+        let gather = gather.to_contiguous();
+        let sizes = flex::Sizes {
+            taps,
+            rows,
+            inputs,
+            outputs,
+        };
+        let (features, gradient) = (slices::read(features), slices::read(gradient));
+        let output = flex::weight_gradient(&features, &gradient, gather.storage::<i32>(), sizes);
+        slices::tensor(output, Shape::new([taps, inputs, outputs]))
+    }
+}
 
 impl SparseConv for CubeBackend {}
 
