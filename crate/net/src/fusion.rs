@@ -6,6 +6,7 @@ use burn::tensor::{Device, Tensor};
 
 use crate::ops::pool::pool;
 use crate::ops::rows::sample;
+use crate::ops::views::{self, ViewsShape, view_tokens};
 use crate::planes::Plane;
 use crate::{Level, NetConfig};
 
@@ -15,6 +16,7 @@ mod matching;
 mod pairs;
 
 pub use crate::ops::pool::Pooling;
+use encoder::flat;
 pub use encoder::{EncoderLayer, HEADS};
 pub use lift::Lift;
 pub use matching::{GROUPS, likeness};
@@ -98,25 +100,69 @@ impl Fusion {
                 occupancy: Tensor::zeros([0], &device),
             };
         }
-        let base = sample(plane.base.clone(), &pairs.places);
-        let mut inputs = Vec::with_capacity(3);
-        let alike = self.matching.then(|| likeness(base.clone(), segments));
-        inputs.push(match (&self.lift, &plane.hidden) {
-            (Some(lift), Some(hidden)) => lift.forward(base, sample(hidden.clone(), &pairs.places)),
-            _ => base,
-        });
-        let depth = (pairs.z_m.clone() - DEPTH_MEAN_M) / DEPTH_STEP_M;
-        inputs.push(depth.unsqueeze_dim(1));
-        inputs.extend(alike);
-        let mut tokens = self.embed.forward(Tensor::cat(inputs, 1));
-        for layer in &self.layers {
-            tokens = layer.forward(tokens, segments);
-        }
+        let depth = ((pairs.z_m.clone() - DEPTH_MEAN_M) / DEPTH_STEP_M).unsqueeze_dim(1);
+        let tokens = if views::runs_on(&plane.base) {
+            self.tokens_in_blocks(plane, pairs, depth)
+        } else {
+            self.tokens(plane, pairs, depth)
+        };
         let occupancy = self.occupancy.forward(tokens.clone()).flatten::<1>(0, 1);
         let pooled = pool(tokens, occupancy.clone(), segments, pooling);
         Fused {
             features: self.norm.forward(pooled),
             occupancy,
         }
+    }
+
+    /// Tokens `[P, C]` of the pairs in tensor operations, on any device; `depth` is `[P, 1]`.
+    pub fn tokens(&self, plane: &Plane, pairs: &PairTensors, depth: Tensor<2>) -> Tensor<2> {
+        let base = sample(plane.base.clone(), &pairs.places);
+        let mut inputs = Vec::with_capacity(3);
+        let alike = self
+            .matching
+            .then(|| likeness(base.clone(), &pairs.segments));
+        inputs.push(match (&self.lift, &plane.hidden) {
+            (Some(lift), Some(hidden)) => lift.forward(base, sample(hidden.clone(), &pairs.places)),
+            _ => base,
+        });
+        inputs.push(depth);
+        inputs.extend(alike);
+        let mut tokens = self.embed.forward(Tensor::cat(inputs, 1));
+        for layer in &self.layers {
+            tokens = layer.forward(tokens, &pairs.segments);
+        }
+        tokens
+    }
+
+    /// The same in loops for the processor.
+    fn tokens_in_blocks(&self, plane: &Plane, pairs: &PairTensors, depth: Tensor<2>) -> Tensor<2> {
+        let extra = if self.matching {
+            let base = sample(plane.base.clone(), &pairs.places);
+            Tensor::cat(vec![depth, likeness(base, &pairs.segments)], 1)
+        } else {
+            depth
+        };
+        let lifted = self.lift.as_ref().zip(plane.hidden.as_ref());
+        let mut weights = Vec::new();
+        if let Some((lift, _)) = lifted {
+            weights.extend(flat(&lift.linear).into_iter().flatten());
+        }
+        weights.extend(flat(&self.embed).into_iter().flatten());
+        weights.extend(self.layers.iter().flat_map(EncoderLayer::weights));
+        let shape = ViewsShape {
+            channels: plane.base.dims()[1],
+            extra: extra.dims()[1],
+            lift: lifted.is_some(),
+            layers: self.layers.len(),
+            heads: HEADS,
+        };
+        view_tokens(
+            plane.base.clone(),
+            lifted.map(|(_, hidden)| hidden.clone()),
+            extra,
+            Tensor::cat(weights, 0),
+            (&pairs.places, &pairs.segments),
+            shape,
+        )
     }
 }

@@ -74,7 +74,7 @@ fn peak(views: usize, plain: bool) -> usize {
 #[test]
 fn memory_does_not_grow_with_the_views() {
     let table = 4 * ROWS * CHANNELS;
-    for (plain, tables) in [(false, 6), (true, 24)] {
+    for (plain, tables) in [(false, 7), (true, 24)] {
         // Threads and their scratch come up once.
         peak(8, plain);
         let few = peak(8, plain);

@@ -38,6 +38,23 @@ impl EncoderLayer {
         }
     }
 
+    /// All weights in one list, in the order of [`view_tokens`](crate::ops::views::view_tokens).
+    pub(super) fn weights(&self) -> Vec<Tensor<1>> {
+        let norm = |norm: &LayerNorm| {
+            let shift = norm.beta.as_ref().map(|beta| beta.val());
+            [Some(norm.gamma.val()), shift]
+        };
+        let parts = [
+            norm(&self.norm_attention),
+            flat(&self.query_key_value),
+            flat(&self.output),
+            norm(&self.norm_mlp),
+            flat(&self.mlp_in),
+            flat(&self.mlp_out),
+        ];
+        parts.into_iter().flatten().flatten().collect()
+    }
+
     /// Tokens `[P, C]` of pairs in, the same out.
     pub fn forward(&self, tokens: Tensor<2>, segments: &Segments) -> Tensor<2> {
         let [_, channels] = tokens.dims();
@@ -56,4 +73,10 @@ impl EncoderLayer {
         let hidden = relu(self.mlp_in.forward(self.norm_mlp.forward(tokens.clone())));
         tokens + self.mlp_out.forward(hidden)
     }
+}
+
+/// Weight, row by row, and bias of a linear layer.
+pub(super) fn flat(linear: &Linear) -> [Option<Tensor<1>>; 2] {
+    let weight = linear.weight.val().flatten(0, 1);
+    [Some(weight), linear.bias.as_ref().map(|bias| bias.val())]
 }

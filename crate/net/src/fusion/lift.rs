@@ -10,7 +10,7 @@ use burn::tensor::{Device, Tensor};
 /// plain back-projection.
 #[derive(Module, Debug)]
 pub struct Lift {
-    linear: Linear,
+    pub(super) linear: Linear,
 }
 
 impl Lift {

@@ -17,7 +17,7 @@ use super::segments::{Segments, Walk, take};
 #[cfg(not(target_family = "wasm"))]
 use burn::backend::Autodiff;
 
-mod flex;
+pub(crate) mod flex;
 
 /// Attention among the rows of each segment. `query`, `key`, `value` are `[P, d]`; `heads` divides `d`.
 pub fn attention(

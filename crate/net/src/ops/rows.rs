@@ -16,7 +16,7 @@ use super::segments::take;
 #[cfg(not(target_family = "wasm"))]
 use burn::backend::Autodiff;
 
-mod flex;
+pub(crate) mod flex;
 
 /// Where rows are read from a table of planes, pixel by pixel: row `x + width * (y + height * view)`.
 #[derive(Clone, Debug)]

@@ -1,37 +1,48 @@
-//! Attention in loops for the processor: a segment's rows lie together and stay in the nearest cache.
+//! Attention in loops for the processor: a segment's rows lie together and stay in the nearest cache. The scores of one
+//! row at a time are held, never those of all.
 
 use burn::backend::{Flex, tensor::FloatTensor};
 use rayon::prelude::*;
 
 use super::super::flex::{parts, split_rows, tensor};
+use super::super::lanes::{LANES, add_scaled, dot, exp};
+use super::super::wide::wide;
 use super::{AttentionPasses, Shared};
 
 /// Rows that a thread takes at a time.
-const ROWS: usize = 2048;
+const ROWS: usize = 512;
 
-/// Where query, key and value of a row begin, and how far the next row is.
+/// Query, key and value of the rows of a segment.
 #[derive(Clone, Copy)]
-pub(crate) struct Strided<'a> {
-    /// The first row's query.
-    pub query: &'a [f32],
-    /// The first row's key.
-    pub key: &'a [f32],
-    /// The first row's value.
-    pub value: &'a [f32],
+pub(crate) struct Table<'a> {
+    /// The first row's query, key and value, and what follows.
+    pub parts: [&'a [f32]; 3],
     /// Numbers from one row to the next.
     pub stride: usize,
+    /// Channels of a row.
+    pub channels: usize,
+    /// Parts of the channels that attend on their own.
+    pub heads: usize,
 }
 
-impl<'a> Strided<'a> {
-    fn at(self, row: usize) -> Self {
-        let from = row * self.stride;
+impl<'a> Table<'a> {
+    /// From a later row on.
+    #[inline(always)]
+    pub fn starting_at(self, row: usize) -> Self {
         Self {
-            query: &self.query[from..],
-            key: &self.key[from..],
-            value: &self.value[from..],
-            stride: self.stride,
+            parts: self.parts.map(|part| &part[row * self.stride..]),
+            ..self
         }
     }
+}
+
+/// Room for one segment's scores and packed keys and values.
+#[derive(Debug, Default)]
+pub(crate) struct Scratch {
+    keys: Vec<f32>,
+    values: Vec<f32>,
+    scores: Vec<f32>,
+    gains: Vec<f32>,
 }
 
 impl AttentionPasses for Flex {
@@ -39,18 +50,16 @@ impl AttentionPasses for Flex {
         inputs: [FloatTensor<Self>; 3],
         shared: &Shared<Self>,
     ) -> (FloatTensor<Self>, FloatTensor<Self>) {
-        let [query, key, value] = inputs.map(|t| t.to_contiguous());
-        let [rows, channels] = *query.layout().shape().as_slice() else {
-            return (query, key);
-        };
+        let inputs = inputs.map(|t| t.to_contiguous());
+        let [rows, channels] = inputs[0].layout().shape().dims();
         let heads = shared.heads;
-        let offsets = shared.offsets.clone().to_contiguous();
+        let offsets = shared.offsets.to_contiguous();
         let offsets: &[i32] = offsets.storage();
-        let table = Strided {
-            query: query.storage(),
-            key: key.storage(),
-            value: value.storage(),
+        let table = Table {
+            parts: inputs.each_ref().map(|t| t.storage()),
             stride: channels,
+            channels,
+            heads,
         };
         let mut out = vec![0.0; rows * channels];
         let mut log_sum = vec![0.0; rows * heads];
@@ -58,20 +67,15 @@ impl AttentionPasses for Flex {
         let outs = split_rows(&mut out, offsets, &parts, channels);
         let sums = split_rows(&mut log_sum, offsets, &parts, heads);
         (&parts, outs, sums).into_par_iter().for_each_init(
-            Vec::new,
-            |scores, (part, out, log_sum)| {
-                let start = offsets[part.start] as usize;
-                for segment in part.clone() {
-                    let [first, end] = [offsets[segment], offsets[segment + 1]].map(|o| o as usize);
-                    forward(
-                        table.at(first),
-                        end - first,
-                        [channels, heads],
-                        scores,
-                        &mut out[(first - start) * channels..(end - start) * channels],
-                        &mut log_sum[(first - start) * heads..(end - start) * heads],
-                    );
-                }
+            Scratch::default,
+            |scratch, (part, out, log_sum)| {
+                forward(
+                    table,
+                    &offsets[part.start..=part.end],
+                    scratch,
+                    out,
+                    log_sum,
+                );
             },
         );
         (
@@ -87,125 +91,238 @@ impl AttentionPasses for Flex {
         grad: FloatTensor<Self>,
         shared: &Shared<Self>,
     ) -> [FloatTensor<Self>; 3] {
-        let [query, key, value] = inputs.map(|t| t.to_contiguous());
-        let [out, log_sum, grad] = [out, log_sum, grad].map(|t| t.to_contiguous());
-        let [rows, channels] = *query.layout().shape().as_slice() else {
-            return [query, key, value];
-        };
+        let inputs = inputs.map(|t| t.to_contiguous());
+        let results = [out, grad, log_sum].map(|t| t.to_contiguous());
+        let [rows, channels] = inputs[0].layout().shape().dims();
         let heads = shared.heads;
-        let offsets = shared.offsets.clone().to_contiguous();
+        let offsets = shared.offsets.to_contiguous();
         let offsets: &[i32] = offsets.storage();
-        let table = Strided {
-            query: query.storage(),
-            key: key.storage(),
-            value: value.storage(),
+        let table = Table {
+            parts: inputs.each_ref().map(|t| t.storage()),
             stride: channels,
+            channels,
+            heads,
         };
-        let [out, log_sum, grad] = [&out, &log_sum, &grad].map(|t| t.storage::<f32>());
+        let [out, grad, log_sum] = results.each_ref().map(|t| t.storage::<f32>());
         let mut grads = [(); 3].map(|()| vec![0.0; rows * channels]);
         let parts = parts(offsets, ROWS);
         let [dq, dk, dv] = grads
             .each_mut()
             .map(|g| split_rows(g, offsets, &parts, channels));
-        (&parts, dq, dk, dv)
-            .into_par_iter()
-            .for_each(|(part, dq, dk, dv)| {
-                let start = offsets[part.start] as usize;
-                for segment in part.clone() {
-                    let [first, end] = [offsets[segment], offsets[segment + 1]].map(|o| o as usize);
-                    let wide = first * channels..end * channels;
-                    let here = (first - start) * channels..(end - start) * channels;
-                    backward(
-                        table.at(first),
-                        end - first,
-                        [channels, heads],
-                        [&out[wide.clone()], &grad[wide]],
-                        &log_sum[first * heads..end * heads],
-                        [&mut dq[here.clone()], &mut dk[here.clone()], &mut dv[here]],
-                    );
+        (&parts, dq, dk, dv).into_par_iter().for_each_init(
+            || (Scratch::default(), Vec::new()),
+            |(scratch, joint), (part, dq, dk, dv)| {
+                let [first, end] = [offsets[part.start], offsets[part.end]].map(|o| o as usize);
+                joint.clear();
+                joint.resize((end - first) * 3 * channels, 0.0);
+                let wide = first * channels..end * channels;
+                backward(
+                    table.starting_at(first),
+                    &offsets[part.start..=part.end],
+                    scratch,
+                    [&out[wide.clone()], &grad[wide]],
+                    &log_sum[first * heads..end * heads],
+                    joint,
+                );
+                for (i, joint) in joint.chunks_exact(3 * channels).enumerate() {
+                    let own = i * channels..(i + 1) * channels;
+                    dq[own.clone()].copy_from_slice(&joint[..channels]);
+                    dk[own.clone()].copy_from_slice(&joint[channels..2 * channels]);
+                    dv[own].copy_from_slice(&joint[2 * channels..]);
                 }
-            });
+            },
+        );
         grads.map(|g| tensor(g, [rows, channels].into()))
     }
 }
 
-/// One segment of `rows` rows. `scores` is scratch.
-pub(crate) fn forward(
-    table: Strided,
+wide! {
+    /// The segments between `offsets`; `table`, `out` and `log_sum` begin with the first of them. Adds to `out`.
+    pub(crate) fn forward(table: Table<'_>, offsets: &[i32], scratch: &mut Scratch, out: &mut [f32], log_sum: &mut [f32]) {
+        let Some(start) = offsets.first().map(|o| *o as usize) else { return };
+        let (channels, heads) = (table.channels, table.heads);
+        for bounds in offsets.windows(2) {
+            let [first, end] = [bounds[0] as usize, bounds[1] as usize];
+            if first == end {
+                continue;
+            }
+            let out = &mut out[(first - start) * channels..(end - start) * channels];
+            let log_sum = &mut log_sum[(first - start) * heads..(end - start) * heads];
+            let table = table.starting_at(first - start);
+            match channels / heads {
+                8 => segment_forward::<8>(table, end - first, scratch, out, log_sum),
+                12 => segment_forward::<12>(table, end - first, scratch, out, log_sum),
+                20 => segment_forward::<20>(table, end - first, scratch, out, log_sum),
+                40 => segment_forward::<40>(table, end - first, scratch, out, log_sum),
+                _ => segment_forward::<0>(table, end - first, scratch, out, log_sum),
+            }
+        }
+    }
+}
+
+wide! {
+    /// As [`forward`]; `results` are the forward pass's result and its gradient. Adds to `joint`, whose rows hold the
+    /// gradients of query, key and value one after the other.
+    pub(crate) fn backward(table: Table<'_>, offsets: &[i32], scratch: &mut Scratch, results: [&[f32]; 2], log_sum: &[f32], joint: &mut [f32]) {
+        let Some(start) = offsets.first().map(|o| *o as usize) else { return };
+        let (channels, heads) = (table.channels, table.heads);
+        for bounds in offsets.windows(2) {
+            let [first, end] = [bounds[0] as usize, bounds[1] as usize];
+            if first == end {
+                continue;
+            }
+            let rows = first - start..end - start;
+            let results = results.map(|t| &t[rows.start * channels..rows.end * channels]);
+            let log_sum = &log_sum[rows.start * heads..rows.end * heads];
+            let joint = &mut joint[rows.start * 3 * channels..rows.end * 3 * channels];
+            let table = table.starting_at(first - start);
+            match channels / heads {
+                8 => segment_backward::<8>(table, end - first, scratch, results, log_sum, joint),
+                12 => segment_backward::<12>(table, end - first, scratch, results, log_sum, joint),
+                20 => segment_backward::<20>(table, end - first, scratch, results, log_sum, joint),
+                40 => segment_backward::<40>(table, end - first, scratch, results, log_sum, joint),
+                _ => segment_backward::<0>(table, end - first, scratch, results, log_sum, joint),
+            }
+        }
+    }
+}
+
+/// Eight rows of a head's channels side by side, `[ceil(rows / 8)][width][8]`, with zeros beyond the last row.
+#[inline(always)]
+fn pack(table: &[f32], stride: usize, rows: usize, width: usize, packed: &mut Vec<f32>) {
+    let groups = rows.div_ceil(LANES);
+    packed.clear();
+    packed.resize(groups * width * LANES, 0.0);
+    for row in 0..rows {
+        let at = row / LANES * width * LANES + row % LANES;
+        for (c, value) in table[row * stride..][..width].iter().enumerate() {
+            packed[at + c * LANES] = *value;
+        }
+    }
+}
+
+/// Scalar products of `row` with the packed rows.
+#[inline(always)]
+fn products(row: &[f32], packed: &[f32], out: &mut [f32]) {
+    let groups = packed.chunks_exact(row.len() * LANES);
+    for (out, group) in out.chunks_exact_mut(LANES).zip(groups) {
+        let mut lanes = [0.0; LANES];
+        for (value, group) in row.iter().zip(group.chunks_exact(LANES)) {
+            for lane in 0..LANES {
+                lanes[lane] += value * group[lane];
+            }
+        }
+        out.copy_from_slice(&lanes);
+    }
+}
+
+/// `out += sum_j weights_j row_j` over rows of `width` channels, which is `W` unless that is 0.
+#[inline(always)]
+fn mix<const W: usize>(weights: &[f32], table: &[f32], stride: usize, out: &mut [f32]) {
+    if W == 0 {
+        for (j, weight) in weights.iter().enumerate() {
+            add_scaled(out, *weight, &table[j * stride..]);
+        }
+        return;
+    }
+    let mut sums = [0.0; W];
+    for (j, weight) in weights.iter().enumerate() {
+        let row = &table[j * stride..][..W];
+        for c in 0..W {
+            sums[c] += weight * row[c];
+        }
+    }
+    for (out, sum) in out.iter_mut().zip(sums) {
+        *out += sum;
+    }
+}
+
+#[inline(always)]
+fn segment_forward<const W: usize>(
+    table: Table<'_>,
     rows: usize,
-    [channels, heads]: [usize; 2],
-    scores: &mut Vec<f32>,
+    scratch: &mut Scratch,
     out: &mut [f32],
     log_sum: &mut [f32],
 ) {
-    let width = channels / heads;
+    let (channels, heads) = (table.channels, table.heads);
+    let width = if W == 0 { channels / heads } else { W };
     let scale = 1.0 / (width as f32).sqrt();
-    scores.resize(rows, 0.0);
-    for i in 0..rows {
-        for head in 0..heads {
-            let channel = head * width;
-            let part =
-                |row: usize| row * table.stride + channel..row * table.stride + channel + width;
-            let query = &table.query[part(i)];
-            let mut most = f32::NEG_INFINITY;
-            for (j, score) in scores.iter_mut().enumerate() {
-                *score = scale * dot(query, &table.key[part(j)]);
-                most = most.max(*score);
+    for head in 0..heads {
+        let [query, key, value] = table.parts.map(|part| &part[head * width..]);
+        pack(key, table.stride, rows, width, &mut scratch.keys);
+        scratch.scores.resize(rows.div_ceil(LANES) * LANES, 0.0);
+        for i in 0..rows {
+            products(
+                &query[i * table.stride..][..width],
+                &scratch.keys,
+                &mut scratch.scores,
+            );
+            let scores = &mut scratch.scores[..rows];
+            let most = scores.iter().fold(
+                f32::NEG_INFINITY,
+                |most, s| if *s > most { *s } else { most },
+            );
+            for score in scores.iter_mut() {
+                *score = exp(scale * (*score - most));
             }
-            let out = &mut out[i * channels + channel..][..width];
-            let mut sum = 0.0;
-            for (j, score) in scores.iter().enumerate() {
-                let weight = (score - most).exp();
-                sum += weight;
-                add_scaled(out, weight, &table.value[part(j)]);
+            let sum = super::super::lanes::sum(scores);
+            let by = 1.0 / sum;
+            for score in scores.iter_mut() {
+                *score *= by;
             }
-            let scale = 1.0 / sum;
-            out.iter_mut().for_each(|o| *o *= scale);
-            log_sum[i * heads + head] = most + sum.ln();
+            let out = &mut out[i * channels + head * width..][..width];
+            mix::<W>(scores, value, table.stride, out);
+            log_sum[i * heads + head] = scale * most + sum.ln();
         }
     }
 }
 
-/// One segment of `rows` rows: adds to the gradients.
-pub(crate) fn backward(
-    table: Strided,
+#[inline(always)]
+fn segment_backward<const W: usize>(
+    table: Table<'_>,
     rows: usize,
-    [channels, heads]: [usize; 2],
+    scratch: &mut Scratch,
     [out, grad]: [&[f32]; 2],
     log_sum: &[f32],
-    [dq, dk, dv]: [&mut [f32]; 3],
+    joint: &mut [f32],
 ) {
-    let width = channels / heads;
+    let (channels, heads) = (table.channels, table.heads);
+    let width = if W == 0 { channels / heads } else { W };
     let scale = 1.0 / (width as f32).sqrt();
-    for i in 0..rows {
-        for head in 0..heads {
-            let channel = head * width;
-            let part =
-                |row: usize| row * table.stride + channel..row * table.stride + channel + width;
-            let row = |row: usize| row * channels + channel..row * channels + channel + width;
-            let query = &table.query[part(i)];
-            let grad = &grad[row(i)];
-            let delta = dot(grad, &out[row(i)]);
-            for j in 0..rows {
-                let key = &table.key[part(j)];
-                let weight = (scale * dot(query, key) - log_sum[i * heads + head]).exp();
-                let gain = scale * weight * (dot(grad, &table.value[part(j)]) - delta);
-                add_scaled(&mut dq[row(i)], gain, key);
-                add_scaled(&mut dk[row(j)], gain, query);
-                add_scaled(&mut dv[row(j)], weight, grad);
+    let padded = rows.div_ceil(LANES) * LANES;
+    for head in 0..heads {
+        let channel = head * width;
+        let [query, key, value] = table.parts.map(|part| &part[channel..]);
+        pack(key, table.stride, rows, width, &mut scratch.keys);
+        pack(value, table.stride, rows, width, &mut scratch.values);
+        scratch.scores.resize(padded, 0.0);
+        scratch.gains.resize(padded, 0.0);
+        for i in 0..rows {
+            let query = &query[i * table.stride..][..width];
+            let own = i * channels + channel;
+            let grad = &grad[own..own + width];
+            products(query, &scratch.keys, &mut scratch.scores);
+            products(grad, &scratch.values, &mut scratch.gains);
+            let delta = dot(grad, &out[own..own + width]);
+            let log_sum = log_sum[i * heads + head];
+            let weights = &mut scratch.scores[..rows];
+            let gains = &mut scratch.gains[..rows];
+            for (weight, gain) in weights.iter_mut().zip(gains.iter_mut()) {
+                *weight = exp(scale * *weight - log_sum);
+                *gain = scale * *weight * (*gain - delta);
+            }
+            mix::<W>(
+                gains,
+                key,
+                table.stride,
+                &mut joint[3 * i * channels + channel..][..width],
+            );
+            for (j, (weight, gain)) in weights.iter().zip(gains.iter()).enumerate() {
+                let row = &mut joint[3 * j * channels..][..3 * channels];
+                add_scaled(&mut row[channels + channel..][..width], *gain, query);
+                add_scaled(&mut row[2 * channels + channel..][..width], *weight, grad);
             }
         }
-    }
-}
-
-#[inline(always)]
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-#[inline(always)]
-fn add_scaled(to: &mut [f32], by: f32, from: &[f32]) {
-    for (to, from) in to.iter_mut().zip(from) {
-        *to += by * from;
     }
 }

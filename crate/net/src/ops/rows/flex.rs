@@ -4,50 +4,55 @@ use burn::backend::{Flex, tensor::FloatTensor};
 use rayon::prelude::*;
 
 use super::super::flex::tensor;
+use super::super::wide::wide;
 use super::{At, RowsPasses, strides};
 
 /// Pairs that a thread takes at a time.
 const PAIRS: usize = 2048;
 
-impl RowsPasses for Flex {
-    fn rows_forward(table: FloatTensor<Self>, at: &At<Self>) -> FloatTensor<Self> {
-        let table = table.to_contiguous();
-        let channels = table.layout().shape()[1];
-        let table: &[f32] = table.storage();
-        let corner = at.corner.clone().to_contiguous();
-        let weights = [at.right.clone(), at.down.clone()].map(|t| t.to_contiguous());
-        let corner: &[i32] = corner.storage();
-        let [right, down] = weights.each_ref().map(|t| t.storage::<f32>());
-        let mut out = vec![0.0; corner.len() * channels];
-        out.par_chunks_mut(PAIRS * channels)
-            .enumerate()
-            .for_each(|(part, out)| {
-                for (i, out) in out.chunks_exact_mut(channels).enumerate() {
-                    let pair = part * PAIRS + i;
-                    let places = places(corner[pair], right[pair], down[pair], at.plane);
-                    let rows = places.map(|(row, _)| &table[row * channels..(row + 1) * channels]);
-                    let weights = places.map(|(_, weight)| weight);
-                    for (c, out) in out.iter_mut().enumerate() {
-                        *out = (weights[0] * rows[0][c] + weights[1] * rows[1][c])
-                            + (weights[2] * rows[2][c] + weights[3] * rows[3][c]);
-                    }
-                }
-            });
-        tensor(out, [corner.len(), channels].into())
+/// Where rows are read from a table, as [`At`].
+#[derive(Clone, Copy)]
+pub(crate) struct Slices<'a> {
+    pub corner: &'a [i32],
+    pub right: &'a [f32],
+    pub down: &'a [f32],
+    pub plane: [usize; 2],
+}
+
+impl Slices<'_> {
+    /// The four rows of a pair and their weights.
+    #[inline(always)]
+    fn places(&self, pair: usize) -> [(usize, f32); 4] {
+        let corner = self.corner[pair] as usize;
+        let [right, down] = [self.right[pair], self.down[pair]];
+        let [across, below] = strides(self.plane);
+        [
+            (corner, (1.0 - right) * (1.0 - down)),
+            (corner + across, right * (1.0 - down)),
+            (corner + below, (1.0 - right) * down),
+            (corner + across + below, right * down),
+        ]
     }
 
-    fn rows_backward(grad: FloatTensor<Self>, rows: usize, at: &At<Self>) -> FloatTensor<Self> {
-        let grad = grad.to_contiguous();
-        let channels = grad.layout().shape()[1];
-        let grad: &[f32] = grad.storage();
-        let corner = at.corner.clone().to_contiguous();
-        let weights = [at.right.clone(), at.down.clone()].map(|t| t.to_contiguous());
-        let corner: &[i32] = corner.storage();
-        let [right, down] = weights.each_ref().map(|t| t.storage::<f32>());
-        // A plane is one thread's: no two threads add to the same row, and sums come out alike on every machine.
-        let pixels = at.plane[0] * at.plane[1];
+    /// Reads a pair's row.
+    #[inline(always)]
+    pub fn read(&self, pair: usize, table: &[f32], out: &mut [f32]) {
+        let channels = out.len();
+        let places = self.places(pair);
+        let [a, b, c, d] = places.map(|(row, _)| &table[row * channels..][..channels]);
+        let weights = places.map(|(_, weight)| weight);
+        for (i, out) in out.iter_mut().enumerate() {
+            *out =
+                (weights[0] * a[i] + weights[1] * b[i]) + (weights[2] * c[i] + weights[3] * d[i]);
+        }
+    }
+
+    /// The gradient of a table of `rows` rows, from that of what was read. A plane is one thread's: no two threads add to
+    /// the same row, and sums come out alike on every machine.
+    pub fn spread(&self, grad: &[f32], rows: usize, channels: usize) -> Vec<f32> {
+        let pixels = self.plane[0] * self.plane[1];
         let mut pairs_of = vec![Vec::new(); rows / pixels];
-        for (pair, corner) in (0_u32..).zip(corner) {
+        for (pair, corner) in (0_u32..).zip(self.corner) {
             pairs_of[*corner as usize / pixels].push(pair);
         }
         let mut out = vec![0.0; rows * channels];
@@ -55,30 +60,66 @@ impl RowsPasses for Flex {
             .into_par_iter()
             .enumerate()
             .for_each(|(view, (out, pairs))| {
-                for &pair in pairs {
-                    let pair = pair as usize;
-                    let grad = &grad[pair * channels..(pair + 1) * channels];
-                    for (row, weight) in places(corner[pair], right[pair], down[pair], at.plane) {
-                        let row = row - view * pixels;
-                        let out = &mut out[row * channels..(row + 1) * channels];
-                        for (out, g) in out.iter_mut().zip(grad) {
-                            *out += weight * g;
-                        }
-                    }
-                }
+                add_pairs(*self, view * pixels, grad, pairs, channels, out)
             });
-        tensor(out, [rows, channels].into())
+        out
     }
 }
 
-/// The four rows and their weights.
-fn places(corner: i32, right: f32, down: f32, plane: [usize; 2]) -> [(usize, f32); 4] {
-    let corner = corner as usize;
-    let [across, below] = strides(plane);
-    [
-        (corner, (1.0 - right) * (1.0 - down)),
-        (corner + across, right * (1.0 - down)),
-        (corner + below, (1.0 - right) * down),
-        (corner + across + below, right * down),
-    ]
+wide! {
+    /// Adds the gradients of `pairs` to the plane that begins with row `first`.
+    fn add_pairs(at: Slices<'_>, first: usize, grad: &[f32], pairs: &[u32], channels: usize, out: &mut [f32]) {
+        for &pair in pairs {
+            let pair = pair as usize;
+            let grad = &grad[pair * channels..][..channels];
+            for (row, weight) in at.places(pair) {
+                super::super::lanes::add_scaled(&mut out[(row - first) * channels..][..channels], weight, grad);
+            }
+        }
+    }
+}
+
+wide! {
+    /// Reads the pairs from `first` on.
+    fn read_pairs(at: Slices<'_>, first: usize, table: &[f32], channels: usize, out: &mut [f32]) {
+        for (i, out) in out.chunks_exact_mut(channels).enumerate() {
+            at.read(first + i, table, out);
+        }
+    }
+}
+
+impl RowsPasses for Flex {
+    fn rows_forward(table: FloatTensor<Self>, at: &At<Self>) -> FloatTensor<Self> {
+        let table = table.to_contiguous();
+        let [_, channels] = table.layout().shape().dims();
+        let table: &[f32] = table.storage();
+        with_slices(at, |at| {
+            let mut out = vec![0.0; at.corner.len() * channels];
+            out.par_chunks_mut(PAIRS * channels)
+                .enumerate()
+                .for_each(|(part, out)| read_pairs(at, part * PAIRS, table, channels, out));
+            tensor(out, [at.corner.len(), channels].into())
+        })
+    }
+
+    fn rows_backward(grad: FloatTensor<Self>, rows: usize, at: &At<Self>) -> FloatTensor<Self> {
+        let grad = grad.to_contiguous();
+        let [_, channels] = grad.layout().shape().dims();
+        let grad: &[f32] = grad.storage();
+        with_slices(at, |at| {
+            tensor(at.spread(grad, rows, channels), [rows, channels].into())
+        })
+    }
+}
+
+/// Runs with the places as slices.
+pub(crate) fn with_slices<R>(at: &At<Flex>, run: impl FnOnce(Slices<'_>) -> R) -> R {
+    let corner = at.corner.to_contiguous();
+    let [right, down] = [&at.right, &at.down].map(|t| t.to_contiguous());
+    run(Slices {
+        corner: corner.storage(),
+        right: right.storage(),
+        down: down.storage(),
+        plane: at.plane,
+    })
 }

@@ -1,0 +1,149 @@
+//! Where the time of fusion goes on the processor, forward and backward:
+//! `cargo test --release --workspace --test net_fusion_speed -- --ignored --nocapture`.
+
+#![cfg(not(target_family = "wasm"))]
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+mod common;
+
+use std::time::Instant;
+
+use burn::tensor::{Device, Distribution, Tensor};
+use net::fusion::{EncoderLayer, FusionConfig, Pairs, Pooling};
+use net::ops::attention::attention;
+use net::ops::pool::pool;
+use net::ops::rows::sample;
+use net::planes::Plane;
+
+const PLANE: [usize; 2] = [40, 30];
+
+/// Voxels that all views see, at places spread over the planes. In the crops of training a third of the views see a voxel.
+fn pairs(voxels: usize, views: usize) -> Pairs {
+    let count = voxels * views;
+    let place = |name: &str, size: usize| -> Vec<f32> {
+        let spread = common::numbers(name, count, 0.5);
+        spread
+            .iter()
+            .map(|p| (p + 0.5) * (size - 1) as f32)
+            .collect()
+    };
+    Pairs {
+        u: place("u", PLANE[0]),
+        v: place("v", PLANE[1]),
+        z_m: vec![2.0; count],
+        view: (0..count).map(|pair| (pair % views) as u32).collect(),
+        offsets: (0..=voxels).map(|n| (n * views) as i32).collect(),
+        plane: PLANE,
+    }
+}
+
+/// Milliseconds of the fastest of three runs, forward and backward.
+fn timed(inputs: &[Tensor<2>], run: impl Fn(Vec<Tensor<2>>) -> Tensor<2>) -> [f64; 2] {
+    let mut best = [f64::INFINITY; 2];
+    for _ in 0..3 {
+        let inputs = inputs.iter().map(|t| t.clone().detach().require_grad());
+        let inputs = inputs.collect();
+        let start = Instant::now();
+        let out = run(inputs);
+        best[0] = best[0].min(start.elapsed().as_secs_f64() * 1e3);
+        let out = out.sum();
+        let start = Instant::now();
+        let _grads = out.backward();
+        best[1] = best[1].min(start.elapsed().as_secs_f64() * 1e3);
+    }
+    best
+}
+
+#[test]
+#[ignore = "a measurement"]
+fn shares() {
+    let device = Device::flex().autodiff();
+    let cases = [
+        (16, 8, 16),
+        (16, 8, 24),
+        (16, 8, 40),
+        (16, 20, 16),
+        (66, 8, 16),
+        (66, 8, 24),
+        (66, 20, 16),
+    ];
+    for (thousands, views, channels) in cases {
+        let pairs = pairs(1000 * thousands, views);
+        let rows = pairs.len();
+        let on = pairs.on(&device);
+        println!(
+            "{thousands}k voxels, {views} views, {channels} channels: forward ms, backward ms, GFLOP/s"
+        );
+        // Multiplications and additions of a token; backward has twice as many, and what it computes again.
+        let report = |part: &str, flop: usize, [f, b]: [f64; 2]| {
+            let speed = |times: f64, ms: f64| times * (flop * rows) as f64 / ms / 1e6;
+            println!(
+                "  {part:12} {f:8.1} {b:8.1} {:8.1} {:8.1}",
+                speed(1.0, f),
+                speed(2.0, b)
+            );
+        };
+        let random = |rows: usize, channels: usize| {
+            Tensor::<2>::random([rows, channels], Distribution::Normal(0.0, 1.0), &device)
+        };
+        let pixels = views * PLANE[0] * PLANE[1];
+        let shape = [views, channels, PLANE[1], PLANE[0]];
+        let table = random(pixels, channels);
+        report(
+            "sample",
+            8 * channels,
+            timed(std::slice::from_ref(&table), |t| {
+                sample(t[0].clone().reshape(shape), &on.places)
+            }),
+        );
+        let table = random(rows, channels);
+        let c = channels;
+        let mixing = 4 * views * c;
+        report(
+            "attention",
+            mixing,
+            timed(&[table.clone(), table.clone(), table.clone()], |t| {
+                attention(t[0].clone(), t[1].clone(), t[2].clone(), &on.segments, 2)
+            }),
+        );
+        let layer = EncoderLayer::new(channels, &device);
+        report(
+            "layer",
+            16 * c * c + mixing,
+            timed(std::slice::from_ref(&table), |t| {
+                layer.forward(t[0].clone(), &on.segments)
+            }),
+        );
+        report(
+            "pool",
+            2 * c,
+            timed(&[table.clone(), random(rows, 1)], |t| {
+                pool(
+                    t[0].clone(),
+                    t[1].clone().flatten(0, 1),
+                    &on.segments,
+                    Pooling::Softmax,
+                )
+            }),
+        );
+        let config = FusionConfig {
+            channels,
+            lift: true,
+            matching: false,
+        };
+        let fusion = config.init(&device);
+        let planes = random(pixels, channels);
+        report(
+            "whole",
+            2 * (16 * c * c + mixing) + 4 * c * c,
+            timed(&[planes.clone(), planes], |t| {
+                let plane = Plane {
+                    base: t[0].clone().reshape(shape),
+                    hidden: Some(t[1].clone().reshape(shape)),
+                    confidence: None,
+                };
+                fusion.forward(&plane, &on, Pooling::Softmax).features
+            }),
+        );
+    }
+}
