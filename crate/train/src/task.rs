@@ -1,0 +1,64 @@
+//! What a trainer needs to know of the network that it trains.
+
+use crate::error::TrainError;
+use burn::module::Module;
+use burn::tensor::{Device, Tensor};
+use net::sample::Sample;
+
+/// When a sample is looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// Decides what the loss draws by chance.
+    pub seed: u64,
+    /// Phase 2: weighted pooling.
+    pub fine_tune: bool,
+    /// A sample to learn from, not to be judged by.
+    pub training: bool,
+}
+
+/// A sample's loss, and how right the network was.
+pub struct Outcome {
+    /// What is made small, `[1]`.
+    pub total: Tensor<1>,
+    /// What it is the sum of, and other numbers worth a line in the log; each `[1]` and without gradient.
+    pub parts: Vec<(&'static str, Tensor<1>)>,
+    /// Hits, false alarms and misses of what is told by yes and no.
+    pub occupancy: Vec<(&'static str, [usize; 3])>,
+    /// Voxels of each level.
+    pub sites: [usize; 3],
+    /// Pairs of a voxel and a view that sees it.
+    pub pairs: [usize; 3],
+}
+
+/// A network and its loss.
+pub trait Task {
+    /// The network.
+    type Model: Module;
+
+    /// The network with fresh weights that `seed` decides.
+    fn fresh(&self, seed: u64, device: &Device) -> Self::Model;
+
+    /// Runs the network over a sample.
+    fn look(
+        &self,
+        model: &Self::Model,
+        sample: &Sample,
+        moment: &Moment,
+        device: &Device,
+    ) -> Outcome;
+
+    /// Multiply-adds of running it forward over `views` pictures with these numbers of voxels and pairs: an estimate.
+    fn forward_macs(&self, views: usize, sites: [usize; 3], pairs: [usize; 3]) -> f64;
+
+    /// The weights as a file.
+    ///
+    /// # Errors
+    /// When they are of no use.
+    fn save(&self, model: &Self::Model) -> Result<Vec<u8>, TrainError>;
+
+    /// The weights of a file that this task wrote.
+    ///
+    /// # Errors
+    /// When the file is not that.
+    fn load(&self, bytes: &[u8], device: &Device) -> Result<Self::Model, TrainError>;
+}
