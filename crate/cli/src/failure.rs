@@ -66,6 +66,9 @@ pub enum Failure {
     /// The run failed.
     #[error(transparent)]
     Run(#[from] recon::RunError),
+    /// The training failed.
+    #[error(transparent)]
+    Train(#[from] train::TrainError),
     /// The volume failed.
     #[error(transparent)]
     Volume(#[from] volume::VolumeError),

@@ -13,6 +13,7 @@ mod reconstruct;
 mod size;
 mod stereo;
 mod synth;
+mod train;
 
 use clap::{Parser, Subcommand};
 use failure::Failure;
@@ -40,6 +41,8 @@ enum Command {
     Doctor(doctor::Arguments),
     /// Make scans of made-up rooms, with exact depth, to learn from.
     Synth(synth::Arguments),
+    /// Train the network on scans with depth.
+    Train(train::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -50,6 +53,7 @@ fn main() -> ExitCode {
         Command::Eval(arguments) => eval::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Synth(arguments) => synth::run(&arguments),
+        Command::Train(arguments) => train::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -96,6 +96,9 @@ pub struct DataConfig {
     pub size: [u32; 2],
     /// Fine voxels (4 cm) of a sample along x, y and z: multiples of 4.
     pub crop: [usize; 3],
+    /// Frames whose picture holds at least this share of a sample's known points are taken first; VoRTX asks for one point.
+    #[serde(default = "least_seen")]
+    pub least_seen: f32,
     /// Depth beyond this many metres makes no truth.
     #[serde(default = "max_depth_m")]
     pub max_depth_m: f32,
@@ -107,6 +110,10 @@ pub struct DataConfig {
     /// Samples prepared ahead.
     #[serde(default = "ahead")]
     pub ahead: usize,
+}
+
+fn least_seen() -> f32 {
+    0.2
 }
 
 fn max_depth_m() -> f32 {

@@ -12,6 +12,7 @@ pub mod data;
 mod error;
 pub mod feed;
 pub mod log;
+pub mod network;
 pub mod plot;
 pub mod random;
 pub mod task;

@@ -35,8 +35,11 @@ pub trait Task {
     /// The network.
     type Model: Module;
 
-    /// The network with fresh weights that `seed` decides.
-    fn fresh(&self, seed: u64, device: &Device) -> Self::Model;
+    /// The network as a run begins with it; `seed` decides what is drawn by chance.
+    ///
+    /// # Errors
+    /// When it begins with given weights that do not fit.
+    fn fresh(&self, seed: u64, device: &Device) -> Result<Self::Model, TrainError>;
 
     /// Runs the network over a sample.
     fn look(

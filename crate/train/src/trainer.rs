@@ -70,7 +70,7 @@ impl<T: Task> Trainer<T> {
         let training_device = device.clone().autodiff();
         let (model, adam, state) = match resume {
             None => {
-                let model = task.fresh(config.seed, &training_device);
+                let model = task.fresh(config.seed, &training_device)?;
                 (model, Adam::default(), None)
             }
             Some(checkpoint) => {
@@ -321,6 +321,7 @@ fn sample_options(config: &TrainConfig, augment: Augment) -> SampleOptions {
         views: config.data.views,
         size: config.data.size,
         crop: config.data.crop,
+        least_seen: config.data.least_seen,
         augment,
     }
 }

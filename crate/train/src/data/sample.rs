@@ -4,7 +4,7 @@ use super::augment;
 use super::crop::{Crop, CropChance};
 use super::picture::{Fit, mirror};
 use super::set::{ScanSet, single};
-use super::views;
+use super::views::{self, Sight};
 use super::volume::{TruthVolume, VOXEL_M};
 use crate::error::TrainError;
 use crate::random::Random;
@@ -55,6 +55,8 @@ pub struct SampleOptions {
     pub size: [u32; 2],
     /// Fine points of the crop along x, y and z.
     pub crop: [usize; 3],
+    /// Frames whose picture holds at least this share of the crop's known points are taken first.
+    pub least_seen: f32,
     /// What is changed by chance.
     pub augment: Augment,
 }
@@ -146,7 +148,7 @@ impl Sampler {
         Ok(Crop::draw(crop, anchor.unwrap_or_default(), chance, random))
     }
 
-    /// Frames that see at least one of every hundredth known point of the crop.
+    /// Frames that see enough of every hundredth known point of the crop.
     fn choose(&self, index: usize, crop: &Crop, tsdf: &[f32], random: &mut Random) -> Vec<usize> {
         const EVERY: usize = 100;
         let entry = &self.set.entries[index];
@@ -162,13 +164,14 @@ impl Sampler {
             .map(|site| Vec3::from_array(site.map(|n| n as f32)) * VOXEL_M)
             .map(|point| world_from_crop.transform_point3(point))
             .collect();
-        let sees = |frame: usize| {
+        let see = |frame: usize| {
             let frame = &entry.frames[frame];
             let camera = super::picture::pinhole(&frame.color_camera);
-            views::seen(&camera, single(&frame.pose), &points) > 0
+            let seen = views::seen(&camera, single(&frame.pose), &points);
+            Sight::new(seen, points.len(), self.options.least_seen)
         };
         let all = entry.frames.len();
-        views::choose(self.options.views, all, &entry.keyframes, sees, random)
+        views::choose(self.options.views, all, &entry.keyframes, see, random)
     }
 
     fn add_view(

@@ -19,25 +19,26 @@ pub fn seen(camera: &Pinhole, world_from_camera: Affine3A, points: &[Vec3]) -> u
     points.iter().filter(inside).count()
 }
 
-/// `count` different frames in random order: of `keyframes` that `sees` says yes to; where those do not suffice, of the
-/// other frames that see something; where those do not suffice either, of any.
+/// `count` different frames in random order: of `keyframes` that `see` enough; where those do not suffice, of the other
+/// frames that see enough; then of those that see anything; then of any.
 pub fn choose(
     count: usize,
     frames: usize,
     keyframes: &[usize],
-    sees: impl Fn(usize) -> bool,
+    see: impl Fn(usize) -> Sight,
     random: &mut Random,
 ) -> Vec<usize> {
     let mut is_key = vec![false; frames];
     for &frame in keyframes {
         is_key[frame] = true;
     }
-    let mut groups: [Vec<usize>; 3] = Default::default();
+    let mut groups: [Vec<usize>; 4] = Default::default();
     for frame in 0..frames {
-        let group = match (sees(frame), is_key[frame]) {
-            (true, true) => 0,
-            (true, false) => 1,
-            (false, _) => 2,
+        let group = match (see(frame), is_key[frame]) {
+            (Sight::Enough, true) => 0,
+            (Sight::Enough, false) => 1,
+            (Sight::Little, _) => 2,
+            (Sight::Nothing, _) => 3,
         };
         groups[group].push(frame);
     }
@@ -45,4 +46,26 @@ pub fn choose(
         random.shuffle(group);
     }
     groups.into_iter().flatten().take(count).collect()
+}
+
+/// How much of a crop a frame sees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sight {
+    /// None of its points.
+    Nothing,
+    /// Less than asked.
+    Little,
+    /// As much as asked.
+    Enough,
+}
+
+impl Sight {
+    /// `seen` of `points` points, where a share of `least` is asked.
+    pub fn new(seen: usize, points: usize, least: f32) -> Self {
+        match seen {
+            0 => Self::Nothing,
+            _ if (seen as f32) < least * points as f32 => Self::Little,
+            _ => Self::Enough,
+        }
+    }
 }

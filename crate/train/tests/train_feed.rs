@@ -1,0 +1,130 @@
+//! Samples come in order, and are the same whoever made them.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+mod common;
+
+use net::sample::Sample;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+use train::TrainError;
+use train::data::{Augment, SampleOptions, Sampler};
+use train::feed::Feed;
+
+fn samples(threads: usize, first: u64, count: usize) -> Vec<Sample> {
+    let set = common::rooms(3, 16, 80, 60);
+    let options = SampleOptions {
+        views: 4,
+        size: [64, 48],
+        crop: [32, 32, 16],
+        augment: Augment::default(),
+        ..common::plain(9)
+    };
+    let mut feed = Feed::start(threads, 5, first, move || {
+        let mut sampler = Sampler::new(set.clone(), options);
+        move |number| sampler.sample(number)
+    });
+    (0..count).map(|_| feed.next().unwrap()).collect()
+}
+
+fn same(a: &Sample, b: &Sample) -> bool {
+    a.views == b.views
+        && a.images == b.images
+        && a.depth_m == b.depth_m
+        && a.truth.tsdf == b.truth.tsdf
+        && a.truth.occupied == b.truth.occupied
+        && a.truth.supervised == b.truth.supervised
+}
+
+#[test]
+fn threads_and_the_start_make_no_difference() {
+    let one = samples(1, 0, 10);
+    let four = samples(4, 0, 10);
+    let later = samples(3, 6, 4);
+    for (i, (a, b)) in one.iter().zip(&four).enumerate() {
+        assert!(
+            same(a, b),
+            "sample {i} differs between one and four threads"
+        );
+    }
+    for (a, b) in one[6..].iter().zip(&later) {
+        assert!(same(a, b), "a sample differs after a resume");
+    }
+    assert!(!same(&one[0], &one[3]), "samples repeat");
+    assert_eq!(one[0].views.len(), 4);
+    assert_eq!(one[0].images.len(), 4 * 3 * 64 * 48);
+    assert_eq!(one[0].depth_m.len(), 4 * 64 * 48);
+}
+
+#[test]
+fn every_scan_comes_once_a_round() {
+    let sampler = Sampler::new(common::rooms(3, 4, 32, 24), common::plain(1));
+    for round in 0..5 {
+        let mut scans: Vec<usize> = (3 * round..3 * round + 3)
+            .map(|n| sampler.scan_of(n))
+            .collect();
+        scans.sort_unstable();
+        assert_eq!(scans, [0, 1, 2]);
+    }
+}
+
+#[test]
+fn no_more_is_made_ahead_than_asked_and_waiting_is_measured() {
+    let made = Arc::new(AtomicU64::new(0));
+    let counted = made.clone();
+    let mut feed = Feed::start(4, 6, 0, move || {
+        let counted = counted.clone();
+        move |number| {
+            counted.fetch_add(1, Ordering::SeqCst);
+            // Later items are faster: the order must hold all the same.
+            std::thread::sleep(Duration::from_millis(20 - number.min(20)));
+            Ok(number)
+        }
+    });
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(made.load(Ordering::SeqCst), 6);
+    let handed: Vec<u64> = (0..20).map(|_| feed.next().unwrap()).collect();
+    assert_eq!(handed, (0..20).collect::<Vec<u64>>());
+    assert_eq!(feed.handed_out(), 20);
+    assert!(feed.waited() > Duration::ZERO);
+    drop(feed);
+    assert!(made.load(Ordering::SeqCst) <= 26);
+}
+
+#[test]
+fn a_fault_is_handed_on_in_its_turn_and_a_broken_thread_is_noticed() {
+    let mut feed = Feed::start(3, 4, 0, || {
+        |number| match number {
+            2 => Err(TrainError::Worker),
+            _ => Ok(number),
+        }
+    });
+    assert_eq!(feed.next().unwrap(), 0);
+    assert_eq!(feed.next().unwrap(), 1);
+    assert!(feed.next().is_err());
+    assert_eq!(feed.next().unwrap(), 3);
+
+    let mut broken = Feed::start(1, 4, 0, || {
+        |number: u64| {
+            assert!(number < 1, "this thread is meant to break off");
+            Ok(number)
+        }
+    });
+    assert_eq!(broken.next().unwrap(), 0);
+    assert!(matches!(broken.next(), Err(TrainError::Worker)));
+}
+
+#[test]
+fn a_crop_larger_than_the_scan_says_so() {
+    let options = SampleOptions {
+        crop: [400, 48, 32],
+        ..common::plain(1)
+    };
+    let mut sampler = Sampler::new(common::rooms(1, 8, 80, 60), options);
+    let said = sampler.sample(0).err().unwrap().to_string();
+    assert!(
+        said.starts_with("room 0: expected a scan of at least 400 x 48 x 32"),
+        "{said}"
+    );
+    assert!(said.contains("make data.crop smaller"), "{said}");
+}
