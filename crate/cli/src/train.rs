@@ -2,10 +2,7 @@
 
 use crate::failure::Failure;
 use ::train::{
-    TrainConfig, TrainError,
-    checkpoint::Checkpoint,
-    data::ScanSet,
-    network::Network,
+    TrainConfig, TrainError, checkpoint::Checkpoint, data::ScanSet, network::Network,
     trainer::Trainer,
 };
 use burn::tensor::Device;
@@ -59,7 +56,11 @@ enum TrainDevice {
 /// Runs `train`.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let config = settings(arguments)?;
-    let resume = arguments.resume.as_deref().map(Checkpoint::read).transpose()?;
+    let resume = arguments
+        .resume
+        .as_deref()
+        .map(Checkpoint::read)
+        .transpose()?;
     let device = match arguments.device {
         TrainDevice::Flex => Device::flex(),
         TrainDevice::Wgpu => {
@@ -83,7 +84,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let ended = trainer.run(|said| eprintln!("{said}"))?;
     eprintln!(
         "{} at step {}; waited for samples {:.1} % of the time",
-        if ended.finished { "finished" } else { "time is up" },
+        if ended.finished {
+            "finished"
+        } else {
+            "time is up"
+        },
         ended.step,
         100.0 * ended.waited_share,
     );

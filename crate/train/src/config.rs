@@ -254,7 +254,7 @@ impl TrainConfig {
             let found = format!("{:?}", data.crop);
             return unfit("data.crop", "multiples of 4 of at least 8", found);
         }
-        if !(data.max_depth_m > 0.0) {
+        if data.max_depth_m.is_nan() || data.max_depth_m <= 0.0 {
             let found = data.max_depth_m.to_string();
             return unfit("data.max_depth_m", "a length above 0", found);
         }

@@ -76,7 +76,7 @@ impl<T: Send + 'static> Feed<T> {
     ///
     /// # Errors
     /// What went wrong while the item was made.
-    pub fn next(&mut self) -> Result<T, TrainError> {
+    pub fn take(&mut self) -> Result<T, TrainError> {
         let started = Instant::now();
         let mut queue = self.shared.lock();
         loop {
@@ -96,7 +96,7 @@ impl<T: Send + 'static> Feed<T> {
         }
     }
 
-    /// How long [`Feed::next`] has waited in all.
+    /// How long [`Feed::take`] has waited in all.
     pub fn waited(&self) -> Duration {
         self.waited
     }

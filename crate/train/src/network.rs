@@ -44,16 +44,10 @@ impl Task for Network {
         }
     }
 
-    fn look(
-        &self,
-        model: &Ipdrecon,
-        sample: &Sample,
-        moment: &Moment,
-        device: &Device,
-    ) -> Outcome {
+    fn look(&self, model: &Ipdrecon, sample: &Sample, moment: &Moment, device: &Device) -> Outcome {
         let options = LossOptions {
             pooling: if moment.fine_tune {
-                Pooling::Weighted
+                Pooling::Softmax
             } else {
                 Pooling::Mean
             },
@@ -95,7 +89,10 @@ impl Task for Network {
         if found != self.net {
             return Err(TrainError::unfit(
                 "weights",
-                format!("those of the network that the settings name, {:?}", self.net),
+                format!(
+                    "those of the network that the settings name, {:?}",
+                    self.net
+                ),
                 format!("those of {found:?}"),
                 "change [net] in the settings, or give other weights",
             ));

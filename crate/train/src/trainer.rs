@@ -199,7 +199,7 @@ impl<T: Task> Trainer<T> {
         let mut numbers = Numbers::default();
         let (mut macs, mut backward) = (0.0, Duration::ZERO);
         for k in 0..batch {
-            let sample = self.feed.next()?;
+            let sample = self.feed.take()?;
             let moment = Moment {
                 seed: self.config.seed ^ (self.step * batch as u64 + k as u64),
                 fine_tune: self.config.fine_tunes(self.step),

@@ -24,7 +24,7 @@ fn samples(threads: usize, first: u64, count: usize) -> Vec<Sample> {
         let mut sampler = Sampler::new(set.clone(), options);
         move |number| sampler.sample(number)
     });
-    (0..count).map(|_| feed.next().unwrap()).collect()
+    (0..count).map(|_| feed.take().unwrap()).collect()
 }
 
 fn same(a: &Sample, b: &Sample) -> bool {
@@ -83,7 +83,7 @@ fn no_more_is_made_ahead_than_asked_and_waiting_is_measured() {
     });
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(made.load(Ordering::SeqCst), 6);
-    let handed: Vec<u64> = (0..20).map(|_| feed.next().unwrap()).collect();
+    let handed: Vec<u64> = (0..20).map(|_| feed.take().unwrap()).collect();
     assert_eq!(handed, (0..20).collect::<Vec<u64>>());
     assert_eq!(feed.handed_out(), 20);
     assert!(feed.waited() > Duration::ZERO);
@@ -99,10 +99,10 @@ fn a_fault_is_handed_on_in_its_turn_and_a_broken_thread_is_noticed() {
             _ => Ok(number),
         }
     });
-    assert_eq!(feed.next().unwrap(), 0);
-    assert_eq!(feed.next().unwrap(), 1);
-    assert!(feed.next().is_err());
-    assert_eq!(feed.next().unwrap(), 3);
+    assert_eq!(feed.take().unwrap(), 0);
+    assert_eq!(feed.take().unwrap(), 1);
+    assert!(feed.take().is_err());
+    assert_eq!(feed.take().unwrap(), 3);
 
     let mut broken = Feed::start(1, 4, 0, || {
         |number: u64| {
@@ -110,8 +110,8 @@ fn a_fault_is_handed_on_in_its_turn_and_a_broken_thread_is_noticed() {
             Ok(number)
         }
     });
-    assert_eq!(broken.next().unwrap(), 0);
-    assert!(matches!(broken.next(), Err(TrainError::Worker)));
+    assert_eq!(broken.take().unwrap(), 0);
+    assert!(matches!(broken.take(), Err(TrainError::Worker)));
 }
 
 #[test]

@@ -7,8 +7,8 @@ mod common;
 use glam::{Affine3A, Quat, Vec2, Vec3};
 use net::sample::Sample;
 use train::data::crop::{Crop, CropChance};
-use train::random::Random;
 use train::data::{Augment, SampleOptions, Sampler};
+use train::random::Random;
 
 /// Where the distance changes its sign between a fine point and its neighbour along an axis, in metres.
 fn surface(sample: &Sample) -> Vec<Vec3> {
@@ -166,10 +166,20 @@ fn a_mirrored_camera_sees_the_mirrored_picture() {
         for local in [Vec3::new(0.3, -0.2, 1.5), Vec3::new(-0.9, 0.4, 3.0)] {
             let before = camera.project(local);
             let in_crop = crop.crop_from_world * pose;
-            let point = crop.pose(pose).inverse().transform_point3(in_crop.transform_point3(local));
+            let point = crop
+                .pose(pose)
+                .inverse()
+                .transform_point3(in_crop.transform_point3(local));
             let after = if crop.mirrored { flipped } else { camera }.project(point);
-            let expected = if crop.mirrored { 159.0 - before.x } else { before.x };
-            assert!((after - Vec2::new(expected, before.y)).length() < 1e-3, "{after} from {before}");
+            let expected = if crop.mirrored {
+                159.0 - before.x
+            } else {
+                before.x
+            };
+            assert!(
+                (after - Vec2::new(expected, before.y)).length() < 1e-3,
+                "{after} from {before}"
+            );
         }
         mirrored += usize::from(crop.mirrored);
     }

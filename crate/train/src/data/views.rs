@@ -33,8 +33,8 @@ pub fn choose(
         is_key[frame] = true;
     }
     let mut groups: [Vec<usize>; 4] = Default::default();
-    for frame in 0..frames {
-        let group = match (see(frame), is_key[frame]) {
+    for (frame, &is_key) in is_key.iter().enumerate() {
+        let group = match (see(frame), is_key) {
             (Sight::Enough, true) => 0,
             (Sight::Enough, false) => 1,
             (Sight::Little, _) => 2,

@@ -70,7 +70,7 @@ impl Validation {
             let mut sampler = Sampler::new(set.clone(), options);
             move |number| sampler.sample(number)
         });
-        self.samples = (0..wanted).map(|_| feed.next()).collect::<Result<_, _>>()?;
+        self.samples = (0..wanted).map(|_| feed.take()).collect::<Result<_, _>>()?;
         Ok(())
     }
 }
