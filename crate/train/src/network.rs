@@ -3,7 +3,7 @@
 use crate::config::TrainConfig;
 use crate::cost;
 use crate::error::TrainError;
-use crate::task::{Moment, Outcome, Task};
+use crate::task::{Moment, Outcome, Task, seeded};
 use burn::tensor::Device;
 use net::fusion::Pooling;
 use net::loss::{LossOptions, loss};
@@ -37,10 +37,7 @@ impl Task for Network {
     fn fresh(&self, seed: u64, device: &Device) -> Result<Ipdrecon, TrainError> {
         match &self.start {
             Some(bytes) => self.load(bytes, device),
-            None => {
-                device.seed(seed);
-                Ok(Ipdrecon::new(&self.net, device))
-            }
+            None => Ok(seeded(seed, device, || Ipdrecon::new(&self.net, device))),
         }
     }
 

@@ -4,6 +4,7 @@ use crate::error::TrainError;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use net::sample::Sample;
+use std::sync::{Mutex, PoisonError};
 
 /// When a sample is looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,4 +65,15 @@ pub trait Task {
     /// # Errors
     /// When the file is not that.
     fn load(&self, bytes: &[u8], device: &Device) -> Result<Self::Model, TrainError>;
+}
+
+/// A module whose weights `seed` decides. A device has one stream of random numbers and burn draws weights when they are
+/// first asked for, so this draws all of them at once, and one module at a time.
+pub fn seeded<M: Module>(seed: u64, device: &Device, make: impl FnOnce() -> M) -> M {
+    static STREAM: Mutex<()> = Mutex::new(());
+    let guard = STREAM.lock().unwrap_or_else(PoisonError::into_inner);
+    device.seed(seed);
+    let module = make().materialize();
+    drop(guard);
+    module
 }

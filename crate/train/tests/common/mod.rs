@@ -11,7 +11,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 use synth::{Layout, SampleScan};
 use train::data::{Augment, SampleOptions, ScanSet};
-use train::task::{Moment, Outcome, Task};
+use train::task::{Moment, Outcome, Task, seeded};
 use train::{TrainConfig, TrainError};
 
 /// Depth cut of the tests: far enough that a room's walls are all measured.
@@ -110,12 +110,11 @@ impl Task for ToyTask {
     type Model = Toy;
 
     fn fresh(&self, seed: u64, device: &Device) -> Result<Toy, TrainError> {
-        device.seed(seed);
-        Ok(Toy {
+        Ok(seeded(seed, device, || Toy {
             conv: Conv2dConfig::new([3, 4], [3, 3]).init(device),
             norm: BatchNormConfig::new(4).init(device),
             out: LinearConfig::new(4, 1).init(device),
-        })
+        }))
     }
 
     fn look(&self, model: &Toy, sample: &Sample, _: &Moment, device: &Device) -> Outcome {
