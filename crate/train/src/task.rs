@@ -1,7 +1,7 @@
 //! What a trainer needs to know of the network that it trains.
 
 use crate::error::TrainError;
-use burn::module::Module;
+use burn::module::{Module, ModuleVisitor, Param};
 use burn::tensor::{Device, Tensor};
 use net::sample::Sample;
 use std::sync::{Mutex, PoisonError};
@@ -73,7 +73,17 @@ pub fn seeded<M: Module>(seed: u64, device: &Device, make: impl FnOnce() -> M) -
     static STREAM: Mutex<()> = Mutex::new(());
     let guard = STREAM.lock().unwrap_or_else(PoisonError::into_inner);
     device.seed(seed);
-    let module = make().materialize();
+    let module = make();
+    module.visit(&mut Draw);
     drop(guard);
     module
+}
+
+/// Asks for every tensor once.
+struct Draw;
+
+impl ModuleVisitor for Draw {
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        drop(param.val());
+    }
 }
