@@ -3,15 +3,28 @@
 pub mod affine;
 pub mod attention;
 pub mod batch_norm;
+pub mod channel_norm;
 pub mod depthwise;
 pub(crate) mod flex;
+pub(crate) mod functions;
 mod lanes;
 pub mod linrec;
 pub mod pointwise;
 pub mod pool;
 pub mod rows;
+pub mod scan;
 pub mod segments;
+pub mod silu;
 pub mod sparse_conv;
 pub mod upsample;
 pub mod views;
 pub(crate) mod wide;
+
+use burn::backend::DispatchDevice;
+use burn::tensor::Device;
+
+/// Whether `device` computes in flex's loops, with or without differentiation.
+pub(crate) fn on_processor(device: &Device) -> bool {
+    let plain = device.clone().without_autodiff();
+    matches!(plain.as_dispatch(), DispatchDevice::Flex(_))
+}

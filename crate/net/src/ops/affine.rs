@@ -1,12 +1,63 @@
 //! Planes seen through an affine map.
 
+#[cfg(not(target_family = "wasm"))]
+mod backward;
+mod flex;
+
+use burn::backend::tensor::FloatTensor;
+use burn::backend::{Backend, Dispatch, Flex, backend_extension};
 use burn::tensor::{Int, Tensor, TensorData};
+use burn_flex::FlexTensor;
+
+use super::on_processor;
 
 /// Samples each of `planes` `[V, C, h, w]` at the affine image of its pixels, bilinearly, the edge repeated outside.
 /// `maps` is `[V, 6]`, rows of `[a11 a12 a13; a21 a22 a23]`: `x' = a11 x + a12 y + a13`, `y' = a21 x + a22 y + a23`, in
 /// coordinates from the middle of the plane whose unit is half its height along both axes, so that a rotation is one (method
 /// 3.2; torch's `affine_grid` with `align_corners = false`, with `x` times `w / h` before and divided after).
+///
+/// Where a map leads exactly to a pixel, its gradient is the difference to the next pixel to the right and below. On the
+/// processor one operation that keeps its inputs alone; elsewhere tensor operations.
 pub fn affine_sample(planes: Tensor<4>, maps: Tensor<2>) -> Tensor<4> {
+    if on_processor(&planes.device()) {
+        return Tensor::from_dispatch(<Dispatch as AffineSampling>::affine_sample(
+            planes.into_dispatch(),
+            maps.into_dispatch(),
+        ));
+    }
+    composed(planes, maps)
+}
+
+/// The processor's form of [`affine_sample`].
+#[backend_extension(Flex, Autodiff: cfg(not(target_family = "wasm")))]
+pub trait AffineSampling: Backend {
+    /// See [`affine_sample`].
+    fn affine_sample(planes: FloatTensor<Self>, maps: FloatTensor<Self>) -> FloatTensor<Self>;
+
+    /// Gradients of `planes` and `maps` from the output's.
+    fn affine_sample_backward(
+        planes: FloatTensor<Self>,
+        maps: FloatTensor<Self>,
+        grad: FloatTensor<Self>,
+    ) -> (FloatTensor<Self>, FloatTensor<Self>);
+}
+
+impl AffineSampling for Flex {
+    fn affine_sample(planes: FlexTensor, maps: FlexTensor) -> FlexTensor {
+        flex::forward(planes, maps)
+    }
+
+    fn affine_sample_backward(
+        planes: FlexTensor,
+        maps: FlexTensor,
+        grad: FlexTensor,
+    ) -> (FlexTensor, FlexTensor) {
+        flex::backward(planes, maps, grad)
+    }
+}
+
+/// [`affine_sample`] by tensor operations, on any device.
+pub fn composed(planes: Tensor<4>, maps: Tensor<2>) -> Tensor<4> {
     let [views, channels, height, width] = planes.dims();
     let pixels = height * width;
     let device = planes.device();

@@ -3,13 +3,11 @@
 use burn::module::{Module, Param};
 use burn::nn::Initializer;
 use burn::nn::conv::Conv2d;
-use burn::tensor::{
-    Device, Tensor,
-    activation::{sigmoid, silu},
-};
+use burn::tensor::{Device, Tensor, activation::sigmoid};
 
 use super::layer::{ChannelNorm, convolved, pointwise};
 use super::scan::{SeparableScan, driving, rank};
+use crate::ops::silu::silu;
 
 /// `R = conf * (F + val)`, where `[val, logit conf] = MLP_E(scan(w^T F))`.
 #[derive(Module, Debug)]

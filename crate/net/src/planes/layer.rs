@@ -6,6 +6,7 @@ use burn::nn::{BatchNorm, BatchNormConfig, Initializer, PaddingConfig2d};
 use burn::tensor::{Device, Tensor};
 
 use crate::ops::batch_norm::batch_norm;
+use crate::ops::channel_norm::channel_norm;
 use crate::ops::depthwise::depthwise;
 use crate::ops::pointwise::pointwise as linear;
 
@@ -112,10 +113,7 @@ impl ChannelNorm {
     }
 
     pub(super) fn forward(&self, x: Tensor<4>) -> Tensor<4> {
-        let centred = x.clone() - x.mean_dim(1);
-        let variance = centred.clone().square().mean_dim(1);
-        let scale = (variance + 1e-5).sqrt().recip();
-        centred * scale * of_channels(self.gamma.val()) + of_channels(self.beta.val())
+        channel_norm(x, self.gamma.val(), self.beta.val())
     }
 }
 

@@ -4,10 +4,10 @@
 use burn::module::{Module, Param};
 use burn::nn::conv::Conv2d;
 use burn::nn::{Initializer, conv::Conv2dConfig};
-use burn::tensor::{Device, Distribution, Tensor, activation::softplus};
+use burn::tensor::{Device, Distribution, Tensor};
 
-use super::layer::{convolved, of_channels, pointwise};
-use crate::ops::linrec::linrec;
+use super::layer::{convolved, pointwise};
+use crate::ops::scan::{self, selective_scan};
 
 /// Along rows, then along columns, each in both directions. With constant steps this is
 /// `sum over pixels j of exp(u d (|dx| + |dy|)) x_j`, up to the second pass's gain: exponential decay with Manhattan distance.
@@ -28,26 +28,9 @@ impl SeparableScan {
 
     /// Input `[V, M, h, w]`, steps from features `[V, C, h, w]`; `[V, M, h, w]`.
     pub fn forward(&self, x: Tensor<4>, features: Tensor<4>) -> Tensor<4> {
-        // Exact zero-order hold of dL/ds = u L + x over a step d: gain (e^{du} - 1) / u.
-        let step = self.rows.step(features.clone());
-        let u = self.rows.rate();
-        let keep = (step * u.clone()).exp();
-        let input = (keep.clone() - 1.0) / u * x;
-        let along_rows = both_ways(keep, input);
-
-        // Here the input is scaled by |u|: slow states would otherwise gain up to a thousandfold a second time.
-        let step = self.columns.step(features);
-        let keep = (step * self.columns.rate()).exp();
-        let input = (-keep.clone() + 1.0) * along_rows;
-        both_ways(keep.swap_dims(2, 3), input.swap_dims(2, 3)).swap_dims(2, 3)
+        let along_rows = self.rows.scan(x, features.clone(), scan::Pass::Rows);
+        self.columns.scan(along_rows, features, scan::Pass::Columns)
     }
-}
-
-/// Forward plus backward along the last axis; each pixel's own input counts once.
-fn both_ways(keep: Tensor<4>, input: Tensor<4>) -> Tensor<4> {
-    let forward = linrec(keep.clone(), input.clone(), false);
-    let backward = linrec(keep, input.clone(), true);
-    forward + backward - input
 }
 
 /// One direction's steps and rates.
@@ -78,15 +61,9 @@ impl Pass {
         }
     }
 
-    /// The step `d > 0` of each state at each pixel.
-    fn step(&self, features: Tensor<4>) -> Tensor<4> {
-        let low = convolved(&self.reduce, features);
-        softplus(convolved(&self.expand, low), 1.0)
-    }
-
-    /// `u < 0`, to be broadcast.
-    fn rate(&self) -> Tensor<4> {
-        -of_channels(self.log_rate.val().exp())
+    fn scan(&self, x: Tensor<4>, features: Tensor<4>, pass: scan::Pass) -> Tensor<4> {
+        let step = convolved(&self.expand, convolved(&self.reduce, features));
+        selective_scan(x, step, self.log_rate.val(), pass)
     }
 }
 

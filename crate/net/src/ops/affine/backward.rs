@@ -1,0 +1,54 @@
+//! The sampling as one step of differentiation, which keeps its inputs alone.
+
+use burn::backend::Autodiff;
+use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::CheckpointStrategy};
+use burn::backend::autodiff::grads::Gradients;
+use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
+use burn::backend::tensor::FloatTensor;
+
+use super::AffineSampling;
+
+#[derive(Debug)]
+struct Sampled;
+
+impl<B: AffineSampling> Backward<B, 2> for Sampled {
+    type State = [FloatTensor<B>; 2];
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 2>,
+        grads: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let grad = grads.consume::<B>(&ops.node);
+        let [planes, maps] = ops.state;
+        let (of_planes, of_maps) = B::affine_sample_backward(planes, maps, grad);
+        for (node, found) in ops.parents.into_iter().zip([of_planes, of_maps]) {
+            if let Some(node) = node {
+                grads.register::<B>(node.id, found);
+            }
+        }
+    }
+}
+
+impl<B: AffineSampling, C: CheckpointStrategy> AffineSampling for Autodiff<B, C> {
+    fn affine_sample(planes: FloatTensor<Self>, maps: FloatTensor<Self>) -> FloatTensor<Self> {
+        let prepared = Sampled.prepare::<C>([planes.node(), maps.node()]);
+        let (planes, maps) = (planes.into_primitive(), maps.into_primitive());
+        match prepared.compute_bound().stateful() {
+            OpsKind::Tracked(prepared) => {
+                let sampled = B::affine_sample(planes.clone(), maps.clone());
+                prepared.finish([planes, maps], sampled)
+            }
+            OpsKind::UnTracked(prepared) => prepared.finish(B::affine_sample(planes, maps)),
+        }
+    }
+
+    fn affine_sample_backward(
+        _planes: FloatTensor<Self>,
+        _maps: FloatTensor<Self>,
+        _grad: FloatTensor<Self>,
+    ) -> (FloatTensor<Self>, FloatTensor<Self>) {
+        unimplemented!("second derivatives of affine sampling")
+    }
+}
