@@ -32,6 +32,9 @@ struct Oracle {
     room_from_canonical: DAffine3,
     /// Level, views and sites of every block.
     blocks: RefCell<Vec<(Level, usize, usize)>>,
+    /// Coarse sites that fewer than two of their views see, and cameras of all blocks of that level.
+    lonely: RefCell<usize>,
+    cameras: RefCell<Vec<Vec3>>,
     /// Says that there is nothing at all.
     empty: bool,
     device: Device,
@@ -44,7 +47,9 @@ impl Oracle {
         Self {
             room: Room::new(SEED),
             room_from_canonical: scan_from_room.inverse() * scan.scan_from_canonical(),
-            blocks: RefCell::new(Vec::new()),
+            blocks: RefCell::default(),
+            lonely: RefCell::default(),
+            cameras: RefCell::default(),
             empty: false,
             device: Device::flex(),
         }
@@ -84,6 +89,14 @@ impl Oracle {
     }
 }
 
+fn sees(view: &View, point: Vec3) -> bool {
+    let point = view.world_from_camera.inverse().transform_point3(point);
+    let (width, height) = (view.camera.width as f32, view.camera.height as f32);
+    let pixel = view.camera.project(point);
+    let inside = pixel.x >= 0.0 && pixel.y >= 0.0 && pixel.x < width && pixel.y < height;
+    point.z > 0.0 && point.z < 3.0 && inside
+}
+
 /// A site's place as one number that a child can check its parent by.
 fn mark(site: IVec3) -> f32 {
     (site.x + 211 * site.y + 211 * 211 * site.z).rem_euclid(65_521) as f32
@@ -116,9 +129,18 @@ impl Network for Oracle {
         plane: &usize,
         views: &[View],
         sites: &[IVec3],
-        _origin_m: Vec3,
+        origin_m: Vec3,
     ) -> Tensor<2> {
         assert_eq!(*plane, views.len());
+        if level == Level::Coarse {
+            let points = sites
+                .iter()
+                .map(|site| site.as_vec3() * level.voxel_size_m() + origin_m);
+            let lonely = points.filter(|&p| views.iter().filter(|view| sees(view, p)).count() < 2);
+            *self.lonely.borrow_mut() += lonely.count();
+            let cameras = views.iter().map(View::position_m);
+            self.cameras.borrow_mut().extend(cameras);
+        }
         self.blocks
             .borrow_mut()
             .push((level, views.len(), sites.len()));
@@ -301,7 +323,7 @@ fn colours_are_those_that_the_pictures_show() {
 }
 
 #[test]
-fn the_same_seed_gives_the_same_mesh_and_another_seed_other_views() {
+fn the_same_seed_gives_the_same_mesh() {
     let scan = open(color_alone(|_, bytes| bytes));
     let oracle = Oracle::new(&scan);
     let mesh = |seed, choice| {
@@ -322,6 +344,32 @@ fn the_same_seed_gives_the_same_mesh_and_another_seed_other_views() {
         assert_eq!(first.triangles, again.triangles);
         assert_eq!(first.colors, again.colors);
     }
+}
+
+#[test]
+fn chosen_views_see_more_of_a_tile_than_random_ones() {
+    let scan = open(color_alone(|_, bytes| bytes));
+    let of = |choice, seed| {
+        let mut oracle = Oracle::new(&scan);
+        oracle.empty = true;
+        let config = NetworkConfig {
+            seed,
+            choice,
+            views_a_tile: 6,
+            ..config()
+        };
+        let result = run_with(&scan, config, &oracle, &mut Recorder::default());
+        assert!(matches!(result, Err(RunError::NothingOccupied { .. })));
+        (oracle.lonely.into_inner(), oracle.cameras.into_inner())
+    };
+    let chosen = [1, 2, 3].map(|seed| of(ViewChoice::Coverage, seed));
+    let random = [1, 2, 3].map(|seed| of(ViewChoice::Random, seed));
+    let most = chosen.iter().map(|(lonely, _)| *lonely).max().unwrap();
+    let least = random.iter().map(|(lonely, _)| *lonely).min().unwrap();
+    println!("at most {most} sites seen by one or none, at random at least {least}");
+    assert!(most < least);
+    assert_ne!(random[0].1, random[1].1, "another seed, other views");
+    assert_ne!(chosen[0].1, chosen[1].1, "another seed, other views");
 }
 
 #[test]
