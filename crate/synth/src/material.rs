@@ -20,12 +20,12 @@ pub(crate) fn colour(look: &Look, p: Vec3, normal: Vec3, half: Vec3, pixel_m: f3
         Pattern::Carpet => {
             let loops = noise(p * 210.0, seed) - 0.5;
             let worn = noise(p * 3.0, seed + 1) - 0.5;
-            let fleck = step(noise(p * 60.0, seed + 2), 0.74) * fine(0.03);
+            let fleck = step(noise(p * 60.0, seed + 2), 0.78) * fine(0.02);
             let pile = a.lerp(
                 b,
-                (0.5 + 0.9 * loops * fine(0.012) + 0.5 * worn).clamp(0.0, 1.0),
+                (0.5 + 0.8 * loops * fine(0.007) + 0.4 * worn).clamp(0.0, 1.0),
             );
-            pile.lerp(c, 0.6 * fleck)
+            pile.lerp(c, 0.5 * fleck)
         }
         Pattern::Marble => marble(p, look, fine(0.04)),
         Pattern::Concrete => {

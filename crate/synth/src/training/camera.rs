@@ -1,5 +1,7 @@
 //! What a camera makes of light: exposure, colour, blur, noise. Strengths differ from scan to scan.
 
+use std::sync::OnceLock;
+
 use glam::Vec3;
 use scan::Camera;
 
@@ -17,6 +19,8 @@ pub(crate) struct Sensor {
     /// Sizes of slow changes of exposure (stops) and of white balance.
     drift: [f32; 2],
     white: Vec3,
+    /// How much of the light's own colour is taken out, 0 to 1.
+    neutral: f32,
     /// Blur of the lens as a share of the width.
     blur: f32,
     /// Open share of the time between two frames.
@@ -60,7 +64,8 @@ impl Sensor {
             target: r.range(0.13, 0.27),
             automatic: r.unit(),
             drift: [r.range(0.0, 0.35), r.range(0.0, 0.06)],
-            white: Vec3::new(r.range(-0.12, 0.14), 0.0, r.range(-0.14, 0.12)),
+            white: Vec3::new(r.range(-0.08, 0.08), 0.0, r.range(-0.1, 0.08)),
+            neutral: r.range(0.5, 1.0),
             blur: worse(r, 0.0035),
             shutter: if r.chance(0.4) { 0.0 } else { worse(r, 0.5) },
             shot: 0.008 + worse(r, 0.07),
@@ -79,16 +84,18 @@ impl Sensor {
         }
     }
 
-    /// Develops frame `index`. `mean` is the scan's mean brightness; `next` the view after this one.
+    /// Develops frame `index`. `mean` is the scan's mean colour; `next` the view after this one.
     pub fn develop(
         &self,
         linear: &Linear,
         index: usize,
-        mean: f32,
+        mean: Vec3,
         view: &View,
         next: Option<&View>,
     ) -> Vec<[u8; 3]> {
         let width = linear.width;
+        let mean_color = mean;
+        let mean = grey(mean);
         let mut color: Vec<Vec3> = linear
             .color
             .iter()
@@ -107,7 +114,7 @@ impl Sensor {
             color = soften(&color, width, sigma);
         }
         let gain = self.exposure(&color, index, mean);
-        let balance = self.balance(index);
+        let balance = self.balance(index, mean_color);
         // What needs much light is noisy.
         let grain =
             (gain * mean / self.target).max(0.3) * (0.35 / mean.max(0.02)).clamp(0.5, 3.0).sqrt();
@@ -156,17 +163,18 @@ impl Sensor {
     }
 
     fn exposure(&self, color: &[Vec3], index: usize, mean: f32) -> f32 {
-        let own = brightness(color).max(1e-4);
+        let own = grey(mean_color(color)).max(1e-4);
         let metered = libm::powf(own, self.automatic) * libm::powf(mean, 1.0 - self.automatic);
         let slow = 2.0 * noise(Vec3::new(index as f32 * 0.12, 0.0, 0.0), self.seed ^ 0xE4) - 1.0;
         self.target / metered * libm::exp2f(self.drift[0] * slow)
     }
 
-    fn balance(&self, index: usize) -> Vec3 {
+    fn balance(&self, index: usize, mean: Vec3) -> Vec3 {
         let slow =
             |k: u32| 2.0 * noise(Vec3::new(index as f32 * 0.07, 0.0, 0.0), self.seed ^ k) - 1.0;
         let drift = Vec3::new(slow(0xA1), 0.0, slow(0xA2)) * self.drift[1];
-        Vec3::ONE + self.white + drift
+        let cast = Vec3::ONE.lerp(grey(mean) / mean.max(Vec3::splat(1e-5)), self.neutral);
+        (Vec3::ONE + self.white + drift) * cast.clamp(Vec3::splat(0.4), Vec3::splat(2.5))
     }
 
     fn add_noise(&self, c: Vec3, i: usize, width: usize, frame: usize, grain: f32) -> Vec3 {
@@ -197,8 +205,8 @@ impl Sensor {
 
     /// Linear light to sRGB, 0 to 1 and beyond.
     fn tone(&self, c: Vec3) -> Vec3 {
-        let grey = c.dot(Vec3::new(0.2126, 0.7152, 0.0722));
-        let c = (Vec3::splat(grey) + (c - grey) * self.saturation).max(Vec3::ZERO);
+        let grey = Vec3::splat(grey(c));
+        let c = (grey + (c - grey) * self.saturation).max(Vec3::ZERO);
         let film = |x: f32| {
             let x = 0.8 * x;
             x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)
@@ -210,22 +218,37 @@ impl Sensor {
     }
 }
 
-/// Mean over a picture in which nothing counts more than a few times the mean.
-pub(crate) fn brightness(color: &[Vec3]) -> f32 {
-    let grey = |c: &Vec3| c.dot(Vec3::new(0.2126, 0.7152, 0.0722));
-    let count = color.len().max(1) as f32;
-    let mean = color.iter().map(grey).sum::<f32>() / count;
-    color.iter().map(|c| grey(c).min(2.0 * mean)).sum::<f32>() / count
+fn grey(c: Vec3) -> f32 {
+    c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// sRGB of linear light, between the entries of a table.
+/// Mean colour of a picture in which nothing counts more than twice the mean.
+pub(crate) fn mean_color(color: &[Vec3]) -> Vec3 {
+    let share = 1.0 / color.len().max(1) as f32;
+    let most = 2.0 * share * color.iter().map(|c| grey(*c)).sum::<f32>();
+    let bounded = |c: &Vec3| *c * (most / grey(*c).max(1e-6)).min(1.0);
+    color.iter().map(bounded).sum::<Vec3>() * share
+}
+
+/// sRGB of linear light, both 0 to 1, between entries that lie closer where it is dark.
 fn encode(x: f32) -> f32 {
-    let x = x.clamp(0.0, 1.0);
-    if x <= 0.003_130_8 {
-        x * 12.92
-    } else {
-        1.055 * libm::powf(x, 1.0 / 2.4) - 0.055
-    }
+    const STEPS: usize = 512;
+    static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
+    let table = TABLE.get_or_init(|| {
+        let curve = |i: usize| {
+            let root = i as f32 / STEPS as f32;
+            let x = root * root;
+            if x <= 0.003_130_8 {
+                x * 12.92
+            } else {
+                1.055 * libm::powf(x, 1.0 / 2.4) - 0.055
+            }
+        };
+        (0..=STEPS + 1).map(curve).collect()
+    });
+    let at = x.clamp(0.0, 1.0).sqrt() * STEPS as f32;
+    let low = at as usize;
+    table[low] + (table[low + 1] - table[low]) * (at - low as f32)
 }
 
 /// The mean along a line.

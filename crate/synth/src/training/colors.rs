@@ -34,14 +34,16 @@ pub(crate) fn wood(r: &mut Random) -> [Vec3; 2] {
     ]
 }
 
-/// Any colour that cloth or paint may have, often none at all.
+/// Any colour that cloth or paint may have: mostly quiet ones.
 pub(crate) fn tone(r: &mut Random) -> Vec3 {
-    let chroma = if r.chance(0.4) {
-        r.range(0.0, 0.03)
-    } else {
-        r.range(0.04, 0.17)
+    let chroma = match r.below(20) {
+        0..=9 => r.range(0.0, 0.025),
+        10..=16 => r.range(0.025, 0.08),
+        _ => r.range(0.08, 0.17),
     };
-    oklch(r.range(0.22, 0.88), chroma, r.unit())
+    // Reds, yellows and blues are commoner in rooms than greens and purples.
+    let hue = r.pick(&[0.08, 0.15, 0.2, 0.25, 0.4, 0.6, 0.68, 0.95]) + r.range(-0.05, 0.05);
+    oklch(r.range(0.22, 0.9), chroma, hue)
 }
 
 fn pair(r: &mut Random) -> [Vec3; 2] {
@@ -58,7 +60,7 @@ pub(crate) fn paint(r: &mut Random) -> Vec3 {
             r.range(0.12, 0.35),
         )
     } else {
-        oklch(r.range(0.45, 0.88), r.range(0.01, 0.09), r.unit())
+        oklch(r.range(0.5, 0.9), r.range(0.0, 0.06), r.unit())
     }
 }
 
@@ -217,8 +219,11 @@ pub(crate) fn floor(r: &mut Random, wet: bool) -> Look {
         }
         Pattern::Tiles => tiles(r, base).scale(1.5),
         Pattern::Carpet => {
-            let [a, b] = pair(r);
-            Look::new(kind, [a, b, tone(r)])
+            let pile = oklch(r.range(0.3, 0.8), r.range(0.0, 0.05), r.unit());
+            Look::new(
+                kind,
+                [pile * r.range(0.7, 0.9), pile, tone(r).lerp(pile, 0.5)],
+            )
         }
         Pattern::Marble => {
             Look::new(kind, [base, base * r.range(0.3, 0.7), tone(r)]).gloss(r.range(0.2, 0.6))

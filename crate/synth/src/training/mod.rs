@@ -3,7 +3,9 @@
 mod camera;
 mod colors;
 mod furnish;
+mod light;
 mod pieces;
+mod place;
 mod plan;
 mod render;
 mod room;
@@ -11,6 +13,8 @@ mod scan;
 mod shell;
 mod site;
 mod walk;
+mod walls;
+mod wishes;
 
 pub use room::TrainingRoom;
 pub use scan::TrainingScan;

@@ -7,6 +7,7 @@
 use glam::Vec3;
 
 use crate::path::View;
+use crate::training::light::{Arriving, BLOCK, FAR_M, arriving, probes};
 use crate::training::room::TrainingRoom;
 
 /// Colour before the camera, and exact depth.
@@ -20,35 +21,14 @@ pub(crate) struct Linear {
 
 /// What the first ray of a pixel found.
 #[derive(Clone, Copy, Default)]
-struct Point {
-    solid: u32,
-    t: f32,
-    at: Vec3,
-    normal: Vec3,
-    albedo: Vec3,
-    dir: Vec3,
+pub(crate) struct Point {
+    pub solid: u32,
+    pub t: f32,
+    pub at: Vec3,
+    pub normal: Vec3,
+    pub albedo: Vec3,
+    pub dir: Vec3,
 }
-
-/// Light that arrives at a point, linear RGB.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Arriving {
-    /// From small lights.
-    pub crisp: Vec3,
-    /// From large ones.
-    pub soft: Vec3,
-    /// What is mirrored to the eye, of a surface of gloss 1.
-    pub shine: Vec3,
-    /// From other surfaces.
-    pub around: Vec3,
-}
-
-const AWAY_M: f32 = 1e-3;
-const FAR_M: f32 = 100.0;
-/// Half the side of the largest light that casts hard shadows.
-const SMALL_M: f32 = 0.03;
-/// Light weaker than this share of what else there is, is left out.
-const FAINT: f32 = 0.01;
-const BLOCK: usize = 8;
 
 /// Draws what `view` sees.
 pub(crate) fn trace(room: &TrainingRoom, view: &View) -> Linear {
@@ -128,164 +108,6 @@ fn look(room: &TrainingRoom, view: &View, dir: Vec3) -> Point {
     }
 }
 
-/// One of the ways in which pixels gather light; 64 of them fill a block.
-struct Probe {
-    /// Direction over a surface whose normal is z, denser around it in proportion to the cosine.
-    dir: Vec3,
-    /// Place on a light, -1 to 1 both ways; 16 of them fill a quarter of a block.
-    spot: [f32; 2],
-}
-
-fn probes() -> Vec<Probe> {
-    const GOLDEN: f32 = 2.399_963;
-    let count = BLOCK * BLOCK;
-    (0..count)
-        .map(|at| {
-            let (x, y) = (at % BLOCK, at / BLOCK);
-            // The ordered dither matrix of Bayer (1973), from the lowest bit of x and y upwards.
-            let bits = |bit: usize| ((x ^ y) >> bit & 1) << 1 | y >> bit & 1;
-            let index = bits(0) << 4 | bits(1) << 2 | bits(2);
-            let quarter = bits(0) << 2 | bits(1);
-            let share = (index as f32 + 0.5) / count as f32;
-            let (sin, cos) = libm::sincosf(index as f32 * GOLDEN);
-            let radius = share.sqrt();
-            let mirrored = (quarter as u32).reverse_bits() >> 28;
-            Probe {
-                dir: Vec3::new(radius * cos, radius * sin, (1.0 - share).sqrt()),
-                spot: [(quarter as f32 - 7.5) / 8.0, (mirrored as f32 - 7.5) / 8.0],
-            }
-        })
-        .collect()
-}
-
-/// Light straight from the lights at `at`, just above a surface. `dir` comes from the eye.
-pub(crate) fn direct(
-    room: &TrainingRoom,
-    at: Vec3,
-    normal: Vec3,
-    spot: [f32; 2],
-    dir: Vec3,
-    gloss: f32,
-    enough: f32,
-) -> Arriving {
-    let mut sum = Arriving::default();
-    for light in &room.lights {
-        let spread = light.spread[0] * spot[0] + light.spread[1] * spot[1];
-        let to = light.center + spread - at;
-        let facing = if light.facing == Vec3::ZERO {
-            1.0
-        } else {
-            -to.dot(light.facing)
-        };
-        let cosine = to.dot(normal);
-        if facing <= 0.0 || cosine <= 0.0 {
-            continue;
-        }
-        let square = to.length_squared();
-        let away = square.sqrt();
-        let given = if light.facing == Vec3::ZERO {
-            1.0
-        } else {
-            0.15 + 0.85 * facing / away
-        };
-        let size = light.spread[0].length_squared() + light.spread[1].length_squared();
-        let power = light.power * (given / (0.12 + 0.6 * size + square));
-        let fall = power * (cosine / away);
-        if fall.max_element() < enough || room.scene.blocked(at, to / away, away) {
-            continue;
-        }
-        if size < SMALL_M * SMALL_M {
-            sum.crisp += fall;
-        } else {
-            sum.soft += fall;
-        }
-        if gloss > 0.0 {
-            // Blinn and Phong with exponent 64; a light seen at a low angle shines more.
-            let half = (to / away - dir).normalize_or(normal);
-            let mut h = half.dot(normal).max(0.0);
-            for _ in 0..6 {
-                h *= h;
-            }
-            let low = 1.0 + dir.dot(normal).clamp(-1.0, 0.0);
-            sum.shine += power * (h * (0.5 + 2.0 * low * low));
-        }
-    }
-    sum
-}
-
-/// Light at a pixel: straight from the lights, and from wherever one ray goes.
-fn arriving(room: &TrainingRoom, point: &Point, probe: &Probe) -> Arriving {
-    if point.t == 0.0 {
-        return Arriving::default();
-    }
-    let origin = point.at + point.normal * AWAY_M;
-    let solid = &room.scene.solids[point.solid as usize];
-    let ambient = room.ambient_at(point.at);
-    let enough = FAINT * ambient.max_element();
-    let mut light = direct(
-        room,
-        origin,
-        point.normal,
-        probe.spot,
-        point.dir,
-        solid.look.gloss,
-        enough,
-    );
-    let side = if point.normal.z.abs() < 0.9 {
-        Vec3::Z
-    } else {
-        Vec3::X
-    };
-    let x = side.cross(point.normal).normalize_or(Vec3::X);
-    let y = point.normal.cross(x);
-    let dir = x * probe.dir.x + y * probe.dir.y + point.normal * probe.dir.z;
-    light.around = match room.scene.cast(origin, dir, FAR_M) {
-        Some(hit) => {
-            let other = &room.scene.solids[hit.solid as usize].look;
-            let tone = other.tones[0].lerp(other.tones[1], 0.5);
-            let there = origin + dir * hit.t + hit.normal * AWAY_M;
-            let ambient = room.ambient_at(there);
-            tone * (strongest(room, there, hit.normal) + ambient)
-        }
-        None => ambient,
-    };
-    light
-}
-
-/// Light from the one lamp or window that would give most without shadows.
-fn strongest(room: &TrainingRoom, at: Vec3, normal: Vec3) -> Vec3 {
-    let mut best = (0.0, Vec3::ZERO, Vec3::ZERO);
-    for light in &room.lights {
-        let to = light.center - at;
-        let facing = if light.facing == Vec3::ZERO {
-            1.0
-        } else {
-            -to.dot(light.facing)
-        };
-        let cosine = to.dot(normal);
-        if facing <= 0.0 || cosine <= 0.0 {
-            continue;
-        }
-        let square = to.length_squared();
-        let away = square.sqrt();
-        let given = if light.facing == Vec3::ZERO {
-            1.0
-        } else {
-            0.15 + 0.85 * facing / away
-        };
-        let size = light.spread[0].length_squared() + light.spread[1].length_squared();
-        let fall = light.power * (given * cosine / away / (0.12 + 0.6 * size + square));
-        if fall.element_sum() > best.0 {
-            best = (fall.element_sum(), fall, to);
-        }
-    }
-    let away = best.2.length();
-    if best.0 == 0.0 || room.scene.blocked(at, best.2 / away, away) {
-        return Vec3::ZERO;
-    }
-    best.1
-}
-
 /// Averages soft light over 4 by 4 pixels and the bounce over 8 by 8, as far as they belong to one smooth surface.
 fn smooth(points: &[Point], light: &mut [Arriving], width: usize) {
     let soft = average(points, light, width, 4, 1);
@@ -325,7 +147,8 @@ fn average(
                         let here = &light[v * width + u];
                         sum.soft += here.soft;
                         sum.shine += here.shine;
-                        sum.around += here.around;
+                        sum.around += here.around * here.certainty;
+                        sum.certainty += here.certainty;
                         count += 1.0;
                     }
                 }
@@ -338,7 +161,8 @@ fn average(
                 crisp: light[i].crisp,
                 soft: sum.soft * share,
                 shine: sum.shine * share,
-                around: sum.around * share,
+                around: sum.around / sum.certainty.max(1e-6),
+                certainty: sum.certainty,
             }
         })
         .collect()

@@ -8,9 +8,9 @@ use crate::room::Light;
 use crate::scene::Scene;
 use crate::training::colors::{self, oklch};
 use crate::training::furnish::{Mood, furnish};
+use crate::training::light::direct;
 use crate::training::pieces::lamps;
 use crate::training::plan::{HALF_WALL_M, Plan};
-use crate::training::render::direct;
 use crate::training::shell::{Daylight, build};
 
 /// More lights than this are not looked at: the weakest go.
@@ -59,7 +59,7 @@ impl TrainingRoom {
             .iter()
             .fold(Vec3::splat(1e-3), |a, b| a.max(*b));
         for ambient in &mut room.ambient {
-            *ambient = ambient.max(0.06 * brightest);
+            *ambient = ambient.max(0.12 * brightest);
         }
         room
     }

@@ -1,10 +1,12 @@
 //! A walk through a training room, as the files of a scan.
 
+use glam::Vec3;
+
 use crate::layout::{Content, seven_scenes_upright};
 use crate::path::View;
 use crate::random::{Random, hash_unit};
 use crate::trace::Frame;
-use crate::training::camera::{Sensor, brightness, pinhole};
+use crate::training::camera::{Sensor, mean_color, pinhole};
 use crate::training::render::{depth, trace};
 use crate::training::room::TrainingRoom;
 use crate::training::walk::walk;
@@ -14,13 +16,14 @@ pub struct TrainingScan {
     room: TrainingRoom,
     views: Vec<View>,
     sensor: Sensor,
-    /// Mean brightness over the scan, linear.
-    mean: f32,
+    /// Mean colour over the scan, linear.
+    mean: Vec3,
     seed: u64,
 }
 
 /// Rooms of a seed that are tried until one has space to walk in.
 const ATTEMPTS: u64 = 16;
+const USUAL_WIDTH: u32 = 320;
 
 impl TrainingScan {
     /// The rooms named by `seed`, walked through in `frames` pictures of `width` by `height` pixels.
@@ -29,15 +32,20 @@ impl TrainingScan {
         loop {
             let room = TrainingRoom::new(seed.wrapping_add(attempt << 40));
             let mut r = Random::new(seed.rotate_left(17) ^ attempt);
-            let camera = pinhole(&mut r, width, height);
+            // The way is the same for every size of pictures of one shape.
+            let usual = pinhole(&mut r, USUAL_WIDTH, USUAL_WIDTH * height / width.max(1));
             let sensor = Sensor::new(&mut r);
-            let views = walk(&room, &mut r, frames, camera);
+            let views = walk(&room, &mut r, frames, usual);
             if views.is_none() && attempt + 1 < ATTEMPTS {
                 attempt += 1;
                 continue;
             }
-            let views = views.unwrap_or_default();
-            let mean = mean_brightness(&room, &views);
+            let mut views = views.unwrap_or_default();
+            let camera = usual.scaled(width, height);
+            for view in &mut views {
+                view.camera = camera;
+            }
+            let mean = walk_color(&room, &views);
             return Self {
                 room,
                 views,
@@ -108,18 +116,19 @@ impl TrainingScan {
     }
 }
 
-/// Brightness over the whole walk, from a few tiny pictures.
-fn mean_brightness(room: &TrainingRoom, views: &[View]) -> f32 {
+/// Mean colour over the whole walk, from a few tiny pictures.
+fn walk_color(room: &TrainingRoom, views: &[View]) -> Vec3 {
     const LOOKS: usize = 8;
     let step = views.len().div_ceil(LOOKS).max(1);
     let tiny = |view: &View| View {
         camera: view.camera.scaled(32, 24),
         ..*view
     };
-    let levels: Vec<f32> = views
+    let looks: Vec<Vec3> = views
         .iter()
         .step_by(step)
-        .map(|view| brightness(&trace(room, &tiny(view)).color))
+        .map(|view| mean_color(&trace(room, &tiny(view)).color))
         .collect();
-    (levels.iter().sum::<f32>() / levels.len().max(1) as f32).max(1e-4)
+    let mean = looks.iter().sum::<Vec3>() / looks.len().max(1) as f32;
+    mean.max(Vec3::splat(1e-4))
 }

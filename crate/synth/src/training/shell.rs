@@ -169,11 +169,12 @@ fn glaze(b: &mut Builder, wall: &Wall, hole: Opening, day: Daylight) -> Light {
     let middle = at.at(hole.x, 0.0, hole.sill + 0.5 * hole.height);
     let (w, h) = (hole.width, hole.height);
     // Outside it is much brighter than in the room by day, and black at night.
-    let glow = (3.0 * day.level * b.random.range(0.5, 1.5)).max(0.015);
-    let view = if day.level < 0.08 {
-        Pattern::Blank
-    } else {
-        Pattern::Outside
+    let glow = (day.level * b.random.range(1.5, 14.0)).max(0.015);
+    let view = match b.random.below(4) {
+        _ if day.level < 0.08 => Pattern::Blank,
+        0 => Pattern::Photo,
+        1 => Pattern::Blank,
+        _ => Pattern::Outside,
     };
     let garden = Look::new(view, [day.tint; 3]).glow(glow).gloss(0.5);
     b.block(

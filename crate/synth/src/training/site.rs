@@ -11,6 +11,8 @@ struct Taken {
     area: Area,
     /// Only what is higher than this is in its way.
     above: f32,
+    /// Whether something stands there.
+    stands: bool,
 }
 
 /// One room while it is furnished.
@@ -49,15 +51,28 @@ impl<'a> Site<'a> {
                     (0.9, 0.0)
                 };
                 let area = footprint(&wall.place, [from - 0.05, to + 0.05], [-depth, HALF_WALL_M]);
-                site.taken.push(Taken { area, above });
+                site.keep_free(area, above);
             }
         }
         site
     }
 
     /// Keeps `area` free of what is higher than `above`.
-    pub fn take(&mut self, area: Area, above: f32) {
-        self.taken.push(Taken { area, above });
+    pub fn keep_free(&mut self, area: Area, above: f32) {
+        self.taken.push(Taken {
+            area,
+            above,
+            stands: false,
+        });
+    }
+
+    /// Something stands on `area`.
+    pub fn take(&mut self, area: Area) {
+        self.taken.push(Taken {
+            area,
+            above: 0.0,
+            stands: true,
+        });
     }
 
     /// Share of the floor that things stand on.
@@ -65,6 +80,7 @@ impl<'a> Site<'a> {
         let sum: f32 = self
             .taken
             .iter()
+            .filter(|taken| taken.stands)
             .map(|taken| taken.area.size().x * taken.area.size().y)
             .sum();
         sum / self.space.floor_m2()
@@ -112,7 +128,7 @@ impl<'a> Site<'a> {
                 continue;
             }
             self.covered[index].push([ends[0], ends[1], 0.0, size[2]]);
-            self.take(footprint(&wall.place, ends, [-size[1] - 0.03, 0.0]), 0.0);
+            self.take(footprint(&wall.place, ends, [-size[1] - 0.03, 0.0]));
             return Some(wall.place.at(x, -0.016, 0.0));
         }
         None
@@ -142,7 +158,7 @@ impl<'a> Site<'a> {
             );
             if self.is_free(&wide, 2.0) {
                 let own = footprint(&place, [-half[0], half[0]], [-half[1], half[1]]);
-                self.take(own, 0.0);
+                self.take(own);
                 return Some(place);
             }
         }

@@ -15,6 +15,10 @@ use crate::training::room::TrainingRoom;
 /// Nothing comes closer to the camera than this.
 pub(crate) const CLEAR_M: f32 = 0.3;
 const SEEN_CELL_M: f32 = 0.3;
+/// So near to a goal is there.
+const THERE_M: f32 = 0.01;
+/// Share of a picture that the next one shows as well.
+const ENOUGH_AGAIN: f32 = 0.68;
 /// Rays of a quick look, across and down.
 const GRID: [usize; 2] = [12, 9];
 
@@ -30,21 +34,28 @@ pub(crate) fn walk(
     let stride = 0.03 * libm::powf(8.0, r.unit());
     let shake = r.range(0.002, 0.02);
     let sway = r.bits();
-    let turn_limit = r.range(0.05, 0.2);
+    let across = libm::atanf((0.5 * f64::from(camera.width) / camera.fx) as f32);
+    let turn_limit = r.range(0.05, 0.2).min(0.4 * across);
     while views.len() < frames {
         walker.choose_way(r);
         walker.choose_look(r);
         let step = (stride * r.range(0.5, 1.6)).min(0.3);
-        let way = walker.goal - walker.at;
-        let count = ((way.length() / step).ceil() as usize).clamp(1, 14);
-        let from = walker.at;
-        for i in 1..=count {
-            if views.len() == frames {
+        // Nobody walks on for ever without a new idea.
+        let way = (walker.goal - walker.at).clamp_length_max(14.0 * step);
+        walker.goal = walker.at + way;
+        // Who walks fast turns slowly.
+        let limit = turn_limit * (1.0 - 2.0 * step);
+        let length = way.length().max(1e-3);
+        let ahead = way / length;
+        let mut left = length;
+        for i in 1.. {
+            if views.len() == frames || i > 1 && left < THERE_M {
                 break;
             }
-            walker.at = from + way * (i as f32 / count as f32);
-            walker.turn(turn_limit);
-            let view = walker.view(views.len() as f32, shake, sway);
+            let view = walker.advance(ahead, step.min(left), limit, |walker| {
+                walker.view(views.len() as f32, shake, sway)
+            });
+            left = (walker.goal - walker.at).dot(ahead);
             walker.remember(&view);
             views.push(view);
             if i % 5 == 0 && walker.is_looking_there() {
@@ -52,11 +63,7 @@ pub(crate) fn walk(
             }
         }
         // Where no way was found at least the eyes move on.
-        walker.stuck = if way.length() < 0.02 {
-            walker.stuck + 1
-        } else {
-            0
-        };
+        walker.stuck = if length < 0.02 { walker.stuck + 1 } else { 0 };
         if walker.stuck > 6 {
             return None;
         }
@@ -76,6 +83,8 @@ struct Walker<'a> {
     spin: f32,
     stuck: usize,
     seen: HashSet<IVec3>,
+    /// Some of what the last picture shows.
+    last: Vec<Vec3>,
 }
 
 impl<'a> Walker<'a> {
@@ -95,6 +104,7 @@ impl<'a> Walker<'a> {
             spin: 0.0,
             stuck: 0,
             seen: HashSet::new(),
+            last: Vec::new(),
         };
         walker.choose_look(r);
         walker.ahead = (walker.mark - at).normalize_or(ahead);
@@ -143,7 +153,7 @@ impl<'a> Walker<'a> {
         let mut best = (-1.0, self.mark);
         for _ in 0..10 {
             let (sin, cos) = libm::sincosf(r.range(0.0, TAU));
-            let tilt = -0.3 + 0.42 * (r.unit() + r.unit() + r.unit() - 1.5);
+            let tilt = -0.22 + 0.42 * (r.unit() + r.unit() + r.unit() - 1.5);
             let (dive, level) = libm::sincosf(tilt.clamp(-1.15, 0.55));
             let dir = Vec3::new(cos * level, sin * level, dive);
             let Some(hit) = self.room.scene.cast(self.goal, dir, 9.0) else {
@@ -179,7 +189,47 @@ impl<'a> Walker<'a> {
             }
         }
         let even = counts.iter().map(|count| count.1).fold(0.0, f32::max);
-        0.3 + fresh - 0.8 * near - 2.0 * (even - 0.6).max(0.0)
+        0.3 + fresh + 0.06 * counts.len().min(12) as f32 - 0.8 * near - 2.0 * (even - 0.5).max(0.0)
+    }
+
+    /// Walks `step` metres and turns, less of both where the picture would show too little of the last one.
+    fn advance(&mut self, way: Vec3, step: f32, limit: f32, view: impl Fn(&Self) -> View) -> View {
+        let (at, ahead, spin) = (self.at, self.ahead, self.spin);
+        let mut share = 1.0;
+        loop {
+            (self.at, self.ahead, self.spin) = (at + way * (step * share), ahead, spin);
+            self.turn(limit * share);
+            let next = view(self);
+            if share < 0.2 || self.shown_again(&next) > ENOUGH_AGAIN {
+                return next;
+            }
+            share *= 0.6;
+        }
+    }
+
+    /// Share of the last picture that `view` shows as well.
+    fn shown_again(&self, view: &View) -> f32 {
+        let [width, height] = [view.camera.width, view.camera.height].map(f64::from);
+        let shown = |p: &&Vec3| {
+            let way = **p - view.position_m;
+            let local = view.rotation.transpose() * way;
+            let inside = view.camera.project(local.as_dvec3()).is_some_and(|pixel| {
+                pixel.min_element() >= 0.0 && pixel.x < width && pixel.y < height
+            });
+            let away = way.length();
+            let free = || {
+                let before = self
+                    .room
+                    .scene
+                    .cast(view.position_m, way / away, 0.97 * away);
+                before.is_none()
+            };
+            inside && free()
+        };
+        match self.last.len() {
+            0 => 1.0,
+            count => self.last.iter().filter(shown).count() as f32 / count as f32,
+        }
     }
 
     /// Turns towards the mark by at most `limit` radians, getting faster and slower smoothly.
@@ -226,9 +276,8 @@ impl<'a> Walker<'a> {
     }
 
     fn remember(&mut self, view: &View) {
-        for (at, _, _) in quick_look(self.room, view) {
-            self.seen.insert(cell(at));
-        }
+        self.last = quick_look(self.room, view).map(|look| look.0).collect();
+        self.seen.extend(self.last.iter().map(|at| cell(*at)));
     }
 }
 

@@ -65,7 +65,7 @@ pub(crate) fn ceiling_lamp(b: &mut Builder, at: &Place, on: f32, tint: Vec3) -> 
             }
         }
         2 => {
-            let drop = b.random.range(0.4, 0.8);
+            let drop = b.random.range(0.4, 0.8).min(at.origin.z - 2.2).max(0.05);
             b.rod(at, [0.0; 3], [0.0, 0.0, -drop], [0.004, 0.004], frame);
             let radius = b.random.range(0.1, 0.2);
             b.ball(&at.at(0.0, 0.0, -drop - radius), radius, glow);
@@ -74,7 +74,7 @@ pub(crate) fn ceiling_lamp(b: &mut Builder, at: &Place, on: f32, tint: Vec3) -> 
         }
         3 => {
             // A metal shade, open below: light goes down only.
-            let drop = b.random.range(0.5, 0.9);
+            let drop = b.random.range(0.5, 0.9).min(at.origin.z - 2.1).max(0.05);
             b.rod(at, [0.0; 3], [0.0, 0.0, -drop], [0.004, 0.004], frame);
             let wide = b.random.range(0.14, 0.26);
             let shade = at.at(0.0, 0.0, -drop - 0.1);

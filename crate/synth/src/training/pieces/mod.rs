@@ -3,11 +3,13 @@
 
 pub(crate) mod clutter;
 pub(crate) mod fixtures;
+pub(crate) mod floor_things;
 pub(crate) mod kitchen;
 pub(crate) mod lamps;
 pub(crate) mod sleep;
 pub(crate) mod storage;
 pub(crate) mod tables;
+pub(crate) mod wall_things;
 
 use crate::builder::{Builder, Place};
 use crate::texture::Look;
