@@ -1,7 +1,10 @@
 //! The sparse U-Net of a level (method 1.7).
 
 use super::UNetMaps;
-use crate::ops::sparse_conv::{KernelMap, sparse_conv};
+use crate::ops::{
+    batch_norm::batch_norm,
+    sparse_conv::{KernelMap, sparse_conv},
+};
 use burn::{
     Tensor,
     module::{Module, Param},
@@ -54,7 +57,7 @@ impl Step {
     }
 
     fn forward(&self, features: Tensor<2>, map: &KernelMap) -> Tensor<2> {
-        relu(self.norm.forward(self.conv.forward(features, map)))
+        batch_norm(&self.norm, self.conv.forward(features, map), true)
     }
 }
 
@@ -100,9 +103,9 @@ impl Residual {
     /// Rows `[N, inputs]` to `[N, outputs]`.
     pub fn forward(&self, features: Tensor<2>, map: &KernelMap) -> Tensor<2> {
         let inner = self.first.forward(features.clone(), map);
-        let inner = self.norm.forward(self.second.forward(inner, map));
+        let inner = batch_norm(&self.norm, self.second.forward(inner, map), false);
         let around = match &self.around {
-            Some(around) => around.norm.forward(around.linear.forward(features)),
+            Some(around) => batch_norm(&around.norm, around.linear.forward(features), false),
             None => features,
         };
         relu(inner + around)

@@ -11,9 +11,13 @@ use rayon::prelude::*;
 use super::flex;
 use super::wide::{LANES, wide};
 
-/// What `norm` gives for `x` `[V, C, h, w]`, then, where asked, a ReLU; in one pass over the numbers where burn makes several.
+#[cfg(not(target_family = "wasm"))]
+mod backward;
+mod rows;
+
+/// What `norm` gives for `x` `[V, C, h, w]` or rows `[N, C]`, then, where asked, a ReLU; in one pass over the numbers where burn makes several.
 /// As burn's module does it, training takes the batch's statistics and adds them to the running ones.
-pub fn batch_norm(norm: &BatchNorm, x: Tensor<4>, relu: bool) -> Tensor<4> {
+pub fn batch_norm<const D: usize>(norm: &BatchNorm, x: Tensor<D>, relu: bool) -> Tensor<D> {
     let device = x.device();
     if !(device.is_autodiff() && norm.training.is_enabled()) {
         let (mean, variance) = (norm.running_mean.value(), norm.running_var.value());
@@ -53,7 +57,9 @@ pub trait BatchNormalisation: Backend {
         relu: bool,
     ) -> FloatTensor<Self> {
         let channels = scale.shape()[0];
-        let each = |values| Self::float_reshape(values, Shape::new([1, channels, 1, 1]));
+        let mut each = vec![1; x.shape().num_dims()];
+        each[1] = channels;
+        let each = |values| Self::float_reshape(values, Shape::from(each.clone()));
         let y = Self::float_add(Self::float_mul(x, each(scale)), each(shift));
         if relu { Self::relu(y) } else { y }
     }
@@ -212,6 +218,9 @@ fn scales(
 }
 
 fn apply(x: &[f32], scales: &[[f32; 2]], pixels: usize, relu: bool) -> Vec<f32> {
+    if pixels == 1 {
+        return rows::apply(x, scales, relu);
+    }
     let mut y = vec![0.0; x.len()];
     y.par_chunks_mut(pixels)
         .zip(x.par_chunks(pixels))
@@ -223,13 +232,23 @@ fn apply(x: &[f32], scales: &[[f32; 2]], pixels: usize, relu: bool) -> Vec<f32> 
     y
 }
 
+/// Views, channels, and the pixels of a plane: one for rows `[N, C]`.
+fn sizes(shape: &Shape) -> [usize; 3] {
+    let (views, channels) = (shape[0], shape[1]);
+    [
+        views,
+        channels,
+        shape.num_elements() / (views * channels).max(1),
+    ]
+}
+
 impl BatchNormalisation for Flex {
     fn scaled(x: FlexTensor, scale: FlexTensor, shift: FlexTensor, relu: bool) -> FlexTensor {
         let shape = x.shape();
-        let [_, _, height, width] = shape.dims();
+        let [_, _, pixels] = sizes(&shape);
         let (scale, shift) = (flex::read(scale), flex::read(shift));
         let scales: Vec<[f32; 2]> = scale.iter().zip(&*shift).map(|(a, b)| [*a, *b]).collect();
-        flex::tensor(apply(&flex::read(x), &scales, height * width, relu), shape)
+        flex::tensor(apply(&flex::read(x), &scales, pixels, relu), shape)
     }
 
     fn normalised(
@@ -240,18 +259,22 @@ impl BatchNormalisation for Flex {
         relu: bool,
     ) -> (FlexTensor, FlexTensor, FlexTensor) {
         let shape = x.shape();
-        let [views, channels, height, width] = shape.dims();
-        let pixels = height * width;
+        let [views, channels, pixels] = sizes(&shape);
         let (x, gamma, beta) = (flex::read(x), flex::read(gamma), flex::read(beta));
         // Around a number of the channel's own, so that a variance far below the mean's square is not lost.
         let middle = |channel: usize| x[channel * pixels];
-        let of_planes: Vec<[f32; 2]> = x
-            .par_chunks(pixels)
-            .enumerate()
-            .map(|(plane, x)| moments(x, middle(plane % channels)))
-            .collect();
+        let sums = if pixels == 1 {
+            rows::moments(&x, &x[..channels])
+        } else {
+            let of_planes: Vec<[f32; 2]> = x
+                .par_chunks(pixels)
+                .enumerate()
+                .map(|(plane, x)| moments(x, middle(plane % channels)))
+                .collect();
+            by_channel(&of_planes, channels)
+        };
         let count = (views * pixels) as f64;
-        let (mean, variance): (Vec<f32>, Vec<f32>) = by_channel(&of_planes, channels)
+        let (mean, variance): (Vec<f32>, Vec<f32>) = sums
             .iter()
             .enumerate()
             .map(|(channel, [sum, squares])| {
@@ -280,8 +303,7 @@ impl BatchNormalisation for Flex {
         relu: bool,
     ) -> (FlexTensor, FlexTensor, FlexTensor) {
         let shape = x.shape();
-        let [views, channels, height, width] = shape.dims();
-        let pixels = height * width;
+        let [views, channels, pixels] = sizes(&shape);
         let (x, grad) = (flex::read(x), flex::read(grad));
         let (mean, variance) = (flex::read(mean), flex::read(variance));
         let scales = scales(
@@ -291,17 +313,21 @@ impl BatchNormalisation for Flex {
             &variance,
             epsilon,
         );
-        let of_planes: Vec<[f32; 2]> = x
-            .par_chunks(pixels)
-            .zip(grad.par_chunks(pixels))
-            .enumerate()
-            .map(|(plane, (x, grad))| {
-                let channel = plane % channels;
-                let [scale, shift] = scales[channel];
-                gradient_moments(x, grad, [scale, shift, mean[channel]], relu)
-            })
-            .collect();
-        let sums = by_channel(&of_planes, channels);
+        let sums = if pixels == 1 {
+            rows::gradient_moments(&x, &grad, &scales, &mean, relu)
+        } else {
+            let of_planes: Vec<[f32; 2]> = x
+                .par_chunks(pixels)
+                .zip(grad.par_chunks(pixels))
+                .enumerate()
+                .map(|(plane, (x, grad))| {
+                    let channel = plane % channels;
+                    let [scale, shift] = scales[channel];
+                    gradient_moments(x, grad, [scale, shift, mean[channel]], relu)
+                })
+                .collect();
+            by_channel(&of_planes, channels)
+        };
         let count = (views * pixels) as f64;
         // dx = scale (g - mean of g - x^ mean of (g x^)), x^ = (x - mean) / deviation.
         let factors: Vec<[f32; 3]> = (0..channels)
@@ -314,14 +340,18 @@ impl BatchNormalisation for Flex {
             })
             .collect();
         let mut of_x = vec![0.0; x.len()];
-        of_x.par_chunks_mut(pixels)
-            .zip(x.par_chunks(pixels))
-            .zip(grad.par_chunks(pixels))
-            .enumerate()
-            .for_each(|(plane, ((of_x, x), grad))| {
-                let channel = plane % channels;
-                gradient_plane(x, grad, of_x, scales[channel], factors[channel], relu);
-            });
+        if pixels == 1 {
+            rows::gradient(&x, &grad, &mut of_x, &scales, &factors, relu);
+        } else {
+            of_x.par_chunks_mut(pixels)
+                .zip(x.par_chunks(pixels))
+                .zip(grad.par_chunks(pixels))
+                .enumerate()
+                .for_each(|(plane, ((of_x, x), grad))| {
+                    let channel = plane % channels;
+                    gradient_plane(x, grad, of_x, scales[channel], factors[channel], relu);
+                });
+        }
         let of_gamma = sums.iter().zip(&*variance);
         let of_gamma = of_gamma.map(|([_, products], variance)| {
             (products / (f64::from(*variance) + epsilon).sqrt()) as f32
@@ -332,63 +362,5 @@ impl BatchNormalisation for Flex {
             flex::tensor(of_gamma.collect(), [channels].into()),
             flex::tensor(of_beta.collect(), [channels].into()),
         )
-    }
-}
-
-#[cfg(not(target_family = "wasm"))]
-mod backward {
-    use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::CheckpointStrategy};
-    use burn::backend::autodiff::grads::Gradients;
-    use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
-    use burn::backend::tensor::FloatTensor;
-    use burn::backend::{Autodiff, AutodiffBackend};
-
-    use super::BatchNormalisation;
-
-    #[derive(Debug)]
-    struct Normalised;
-
-    impl<B: BatchNormalisation> Backward<B, 3> for Normalised {
-        /// Input, gamma, beta, mean, variance; epsilon and whether a ReLU follows.
-        type State = ([FloatTensor<B>; 5], f64, bool);
-
-        fn backward(
-            self,
-            ops: Ops<Self::State, 3>,
-            grads: &mut Gradients,
-            _checkpointer: &mut Checkpointer,
-        ) {
-            let grad = grads.consume::<B>(&ops.node);
-            let ([x, gamma, beta, mean, variance], epsilon, relu) = ops.state;
-            let found = B::normalised_backward(x, gamma, beta, mean, variance, grad, epsilon, relu);
-            for (node, found) in ops.parents.into_iter().zip([found.0, found.1, found.2]) {
-                if let Some(node) = node {
-                    grads.register::<B>(node.id, found);
-                }
-            }
-        }
-    }
-
-    impl<B: BatchNormalisation, C: CheckpointStrategy> BatchNormalisation for Autodiff<B, C> {
-        fn normalised(
-            x: FloatTensor<Self>,
-            gamma: FloatTensor<Self>,
-            beta: FloatTensor<Self>,
-            epsilon: f64,
-            relu: bool,
-        ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>) {
-            let prepared = Normalised.prepare::<C>([x.node(), gamma.node(), beta.node()]);
-            let [x, gamma, beta] = [x, gamma, beta].map(|tensor| tensor.into_primitive());
-            let (y, mean, variance) =
-                B::normalised(x.clone(), gamma.clone(), beta.clone(), epsilon, relu);
-            let y = match prepared.compute_bound().stateful() {
-                OpsKind::Tracked(prepared) => {
-                    let kept = [x, gamma, beta, mean.clone(), variance.clone()];
-                    prepared.finish((kept, epsilon, relu), y)
-                }
-                OpsKind::UnTracked(prepared) => prepared.finish(y),
-            };
-            (y, Self::from_inner(mean), Self::from_inner(variance))
-        }
     }
 }
