@@ -4,6 +4,7 @@ use super::sites;
 use crate::ops::sparse_conv::KernelMap;
 use burn::tensor::Device;
 use glam::IVec3;
+use rayon::prelude::*;
 
 /// The maps of a [`UNet`](super::UNet)'s three resolutions over a set of sites, made once and shared by its convolutions.
 #[derive(Clone, Debug)]
@@ -47,8 +48,8 @@ pub fn submanifold(sites: &[IVec3], device: &Device) -> KernelMap {
     let gather = sites::neighbours(sites);
     // Site m meets site n under tap k as n meets m under the opposite tap.
     let scatter = gather
-        .chunks_exact(27)
-        .flat_map(|taps| taps.iter().rev().copied())
+        .par_chunks_exact(27)
+        .flat_map_iter(|taps| taps.iter().rev().copied())
         .collect();
     KernelMap::new(gather, scatter, 27, device)
 }
