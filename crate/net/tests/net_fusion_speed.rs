@@ -54,96 +54,93 @@ fn timed(inputs: &[Tensor<2>], run: impl Fn(Vec<Tensor<2>>) -> Tensor<2>) -> [f6
     best
 }
 
+/// Voxels in thousands, views, channels.
+const CASES: [[usize; 3]; 7] = [
+    [16, 8, 16],
+    [16, 8, 24],
+    [16, 8, 40],
+    [16, 20, 16],
+    [66, 8, 16],
+    [66, 8, 24],
+    [66, 20, 16],
+];
+
+fn random(rows: usize, channels: usize, device: &Device) -> Tensor<2> {
+    Tensor::random([rows, channels], Distribution::Normal(0.0, 1.0), device)
+}
+
+/// Multiplications and additions of a pair; backward has twice as many, and those of forward again where they are not kept.
+fn report(part: &str, flop: usize, pairs: usize, [f, b]: [f64; 2]) {
+    let speed = |times: f64, ms: f64| times * (flop * pairs) as f64 / ms / 1e6;
+    println!(
+        "  {part:10} {f:8.1} {b:8.1} {:8.1} {:8.1}",
+        speed(1.0, f),
+        speed(2.0, b)
+    );
+}
+
 #[test]
 #[ignore = "a measurement"]
-fn shares() {
+fn whole() {
     let device = Device::flex().autodiff();
-    let cases = [
-        (16, 8, 16),
-        (16, 8, 24),
-        (16, 8, 40),
-        (16, 20, 16),
-        (66, 8, 16),
-        (66, 8, 24),
-        (66, 20, 16),
-    ];
-    for (thousands, views, channels) in cases {
+    for [thousands, views, c] in CASES {
+        let pairs = pairs(1000 * thousands, views);
+        let on = pairs.on(&device);
+        let fusion = FusionConfig {
+            channels: c,
+            lift: true,
+            matching: false,
+        }
+        .init(&device);
+        let planes = random(views * PLANE[0] * PLANE[1], c, &device);
+        let shape = [views, c, PLANE[1], PLANE[0]];
+        let flop = 2 * (16 * c * c + 4 * views * c) + 4 * c * c;
+        println!(
+            "{thousands}k voxels, {views} views, {c} channels: forward ms, backward ms, GFLOP/s"
+        );
+        let times = timed(&[planes.clone(), planes], |t| {
+            let plane = Plane {
+                base: t[0].clone().reshape(shape),
+                hidden: Some(t[1].clone().reshape(shape)),
+                confidence: None,
+            };
+            fusion.forward(&plane, &on, Pooling::Softmax).features
+        });
+        report("whole", flop, pairs.len(), times);
+    }
+}
+
+#[test]
+#[ignore = "a measurement"]
+fn parts() {
+    let device = Device::flex().autodiff();
+    for [thousands, views, c] in CASES {
         let pairs = pairs(1000 * thousands, views);
         let rows = pairs.len();
         let on = pairs.on(&device);
         println!(
-            "{thousands}k voxels, {views} views, {channels} channels: forward ms, backward ms, GFLOP/s"
+            "{thousands}k voxels, {views} views, {c} channels: forward ms, backward ms, GFLOP/s"
         );
-        // Multiplications and additions of a token; backward has twice as many, and what it computes again.
-        let report = |part: &str, flop: usize, [f, b]: [f64; 2]| {
-            let speed = |times: f64, ms: f64| times * (flop * rows) as f64 / ms / 1e6;
-            println!(
-                "  {part:12} {f:8.1} {b:8.1} {:8.1} {:8.1}",
-                speed(1.0, f),
-                speed(2.0, b)
-            );
-        };
-        let random = |rows: usize, channels: usize| {
-            Tensor::<2>::random([rows, channels], Distribution::Normal(0.0, 1.0), &device)
-        };
-        let pixels = views * PLANE[0] * PLANE[1];
-        let shape = [views, channels, PLANE[1], PLANE[0]];
-        let table = random(pixels, channels);
-        report(
-            "sample",
-            8 * channels,
-            timed(std::slice::from_ref(&table), |t| {
-                sample(t[0].clone().reshape(shape), &on.places)
-            }),
-        );
-        let table = random(rows, channels);
-        let c = channels;
-        let mixing = 4 * views * c;
-        report(
-            "attention",
-            mixing,
-            timed(&[table.clone(), table.clone(), table.clone()], |t| {
-                attention(t[0].clone(), t[1].clone(), t[2].clone(), &on.segments, 2)
-            }),
-        );
-        let layer = EncoderLayer::new(channels, &device);
-        report(
-            "layer",
-            16 * c * c + mixing,
-            timed(std::slice::from_ref(&table), |t| {
-                layer.forward(t[0].clone(), &on.segments)
-            }),
-        );
-        report(
-            "pool",
-            2 * c,
-            timed(&[table.clone(), random(rows, 1)], |t| {
-                pool(
-                    t[0].clone(),
-                    t[1].clone().flatten(0, 1),
-                    &on.segments,
-                    Pooling::Softmax,
-                )
-            }),
-        );
-        let config = FusionConfig {
-            channels,
-            lift: true,
-            matching: false,
-        };
-        let fusion = config.init(&device);
-        let planes = random(pixels, channels);
-        report(
-            "whole",
-            2 * (16 * c * c + mixing) + 4 * c * c,
-            timed(&[planes.clone(), planes], |t| {
-                let plane = Plane {
-                    base: t[0].clone().reshape(shape),
-                    hidden: Some(t[1].clone().reshape(shape)),
-                    confidence: None,
-                };
-                fusion.forward(&plane, &on, Pooling::Softmax).features
-            }),
-        );
+        let shape = [views, c, PLANE[1], PLANE[0]];
+        let planes = random(views * PLANE[0] * PLANE[1], c, &device);
+        let times = timed(&[planes], |t| {
+            sample(t[0].clone().reshape(shape), &on.places)
+        });
+        report("sample", 8 * c, rows, times);
+        let table = random(rows, c, &device);
+        let times = timed(&[table.clone(), table.clone(), table.clone()], |t| {
+            attention(t[0].clone(), t[1].clone(), t[2].clone(), &on.segments, 2)
+        });
+        report("attention", 4 * views * c, rows, times);
+        let layer = EncoderLayer::new(c, &device);
+        let times = timed(std::slice::from_ref(&table), |t| {
+            layer.forward(t[0].clone(), &on.segments)
+        });
+        report("layer", 16 * c * c + 4 * views * c, rows, times);
+        let times = timed(&[table, random(rows, 1, &device)], |t| {
+            let logits = t[1].clone().flatten(0, 1);
+            pool(t[0].clone(), logits, &on.segments, Pooling::Softmax)
+        });
+        report("pool", 2 * c, rows, times);
     }
 }

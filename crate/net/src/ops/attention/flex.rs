@@ -5,7 +5,7 @@ use burn::backend::{Flex, tensor::FloatTensor};
 use rayon::prelude::*;
 
 use super::super::flex::{parts, split_rows, tensor};
-use super::super::lanes::{LANES, add_scaled, dot, exp};
+use super::super::lanes::{LANES, add_scaled, dot, each, exp, ln, sum};
 use super::super::wide::wide;
 use super::{AttentionPasses, Shared};
 
@@ -137,7 +137,7 @@ impl AttentionPasses for Flex {
 }
 
 wide! {
-    /// The segments between `offsets`; `table`, `out` and `log_sum` begin with the first of them. Adds to `out`.
+    /// The segments between `offsets`; `table`, `out` and `log_sum` begin with the first of them.
     pub(crate) fn forward(table: Table<'_>, offsets: &[i32], scratch: &mut Scratch, out: &mut [f32], log_sum: &mut [f32]) {
         let Some(start) = offsets.first().map(|o| *o as usize) else { return };
         let (channels, heads) = (table.channels, table.heads);
@@ -162,7 +162,7 @@ wide! {
 
 wide! {
     /// As [`forward`]; `results` are the forward pass's result and its gradient. Adds to `joint`, whose rows hold the
-    /// gradients of query, key and value one after the other.
+    /// gradients of query, key and value one after the other, and begin as zeros.
     pub(crate) fn backward(table: Table<'_>, offsets: &[i32], scratch: &mut Scratch, results: [&[f32]; 2], log_sum: &[f32], joint: &mut [f32]) {
         let Some(start) = offsets.first().map(|o| *o as usize) else { return };
         let (channels, heads) = (table.channels, table.heads);
@@ -190,15 +190,40 @@ wide! {
 /// Eight rows of a head's channels side by side, `[ceil(rows / 8)][width][8]`, with zeros beyond the last row.
 #[inline(always)]
 fn pack(table: &[f32], stride: usize, rows: usize, width: usize, packed: &mut Vec<f32>) {
-    let groups = rows.div_ceil(LANES);
-    packed.clear();
-    packed.resize(groups * width * LANES, 0.0);
-    for row in 0..rows {
-        let at = row / LANES * width * LANES + row % LANES;
-        for (c, value) in table[row * stride..][..width].iter().enumerate() {
-            packed[at + c * LANES] = *value;
+    let group = width * LANES;
+    packed.resize(rows.div_ceil(LANES) * group, 0.0);
+    if !rows.is_multiple_of(LANES) {
+        packed[rows / LANES * group..].fill(0.0);
+    }
+    for (g, packed) in packed.chunks_exact_mut(group).enumerate() {
+        for lane in 0..LANES.min(rows - g * LANES) {
+            let row = &table[(g * LANES + lane) * stride..][..width];
+            for (packed, value) in packed.chunks_exact_mut(LANES).zip(row) {
+                packed[lane] = *value;
+            }
         }
     }
+}
+
+/// The largest of whole groups of eight.
+#[inline(always)]
+fn largest(scores: &[f32]) -> f32 {
+    let mut lanes = [f32::NEG_INFINITY; LANES];
+    for scores in scores.chunks_exact(LANES) {
+        for lane in 0..LANES {
+            lanes[lane] = if scores[lane] > lanes[lane] {
+                scores[lane]
+            } else {
+                lanes[lane]
+            };
+        }
+    }
+    let larger = |a: f32, b: f32| if a > b { a } else { b };
+    let [a, b, c, d, e, f, g, h] = lanes;
+    larger(
+        larger(larger(a, b), larger(c, d)),
+        larger(larger(e, f), larger(g, h)),
+    )
 }
 
 /// Scalar products of `row` with the packed rows.
@@ -216,12 +241,13 @@ fn products(row: &[f32], packed: &[f32], out: &mut [f32]) {
     }
 }
 
-/// `out += sum_j weights_j row_j` over rows of `width` channels, which is `W` unless that is 0.
+/// `out = by sum_j weights_j row_j` over rows of `out`'s channels, which are `W` unless that is 0.
 #[inline(always)]
-fn mix<const W: usize>(weights: &[f32], table: &[f32], stride: usize, out: &mut [f32]) {
+fn mix<const W: usize>(by: f32, weights: &[f32], table: &[f32], stride: usize, out: &mut [f32]) {
     if W == 0 {
+        out.fill(0.0);
         for (j, weight) in weights.iter().enumerate() {
-            add_scaled(out, *weight, &table[j * stride..]);
+            add_scaled(out, by * *weight, &table[j * stride..]);
         }
         return;
     }
@@ -233,7 +259,7 @@ fn mix<const W: usize>(weights: &[f32], table: &[f32], stride: usize, out: &mut 
         }
     }
     for (out, sum) in out.iter_mut().zip(sums) {
-        *out += sum;
+        *out = by * sum;
     }
 }
 
@@ -258,22 +284,14 @@ fn segment_forward<const W: usize>(
                 &scratch.keys,
                 &mut scratch.scores,
             );
-            let scores = &mut scratch.scores[..rows];
-            let most = scores.iter().fold(
-                f32::NEG_INFINITY,
-                |most, s| if *s > most { *s } else { most },
-            );
-            for score in scores.iter_mut() {
-                *score = exp(scale * (*score - most));
-            }
-            let sum = super::super::lanes::sum(scores);
-            let by = 1.0 / sum;
-            for score in scores.iter_mut() {
-                *score *= by;
-            }
+            let scores = &mut scratch.scores;
+            scores[rows..].fill(f32::NEG_INFINITY);
+            let most = largest(scores);
+            each(scores, [], |score, []| exp(scale * (score - most)));
+            let sum = sum(scores);
             let out = &mut out[i * channels + head * width..][..width];
-            mix::<W>(scores, value, table.stride, out);
-            log_sum[i * heads + head] = scale * most + sum.ln();
+            mix::<W>(1.0 / sum, &scores[..rows], value, table.stride, out);
+            log_sum[i * heads + head] = scale * most + ln(sum);
         }
     }
 }
@@ -306,13 +324,14 @@ fn segment_backward<const W: usize>(
             products(grad, &scratch.values, &mut scratch.gains);
             let delta = dot(grad, &out[own..own + width]);
             let log_sum = log_sum[i * heads + head];
-            let weights = &mut scratch.scores[..rows];
-            let gains = &mut scratch.gains[..rows];
-            for (weight, gain) in weights.iter_mut().zip(gains.iter_mut()) {
-                *weight = exp(scale * *weight - log_sum);
-                *gain = scale * *weight * (*gain - delta);
-            }
+            let (weights, gains) = (&mut scratch.scores, &mut scratch.gains);
+            each(weights, [], |weight, []| exp(scale * weight - log_sum));
+            each(gains, [weights], |gain, [weight]| {
+                scale * weight * (gain - delta)
+            });
+            let (weights, gains) = (&weights[..rows], &gains[..rows]);
             mix::<W>(
+                1.0,
                 gains,
                 key,
                 table.stride,

@@ -4,6 +4,7 @@ use burn::backend::{Flex, tensor::FloatTensor};
 use rayon::prelude::*;
 
 use super::super::flex::tensor;
+use super::super::lanes::{add_scaled, each};
 use super::super::wide::wide;
 use super::{At, RowsPasses, strides};
 
@@ -38,13 +39,11 @@ impl Slices<'_> {
     #[inline(always)]
     pub fn read(&self, pair: usize, table: &[f32], out: &mut [f32]) {
         let channels = out.len();
-        let places = self.places(pair);
-        let [a, b, c, d] = places.map(|(row, _)| &table[row * channels..][..channels]);
-        let weights = places.map(|(_, weight)| weight);
-        for (i, out) in out.iter_mut().enumerate() {
-            *out =
-                (weights[0] * a[i] + weights[1] * b[i]) + (weights[2] * c[i] + weights[3] * d[i]);
-        }
+        let [(a, wa), (b, wb), (c, wc), (d, wd)] = self.places(pair);
+        let row = |at: usize| &table[at * channels..(at + 1) * channels];
+        each(out, [row(a), row(b), row(c), row(d)], |_, [a, b, c, d]| {
+            (wa * a + wb * b) + (wc * c + wd * d)
+        });
     }
 
     /// The gradient of a table of `rows` rows, from that of what was read. A plane is one thread's: no two threads add to
@@ -73,7 +72,7 @@ wide! {
             let pair = pair as usize;
             let grad = &grad[pair * channels..][..channels];
             for (row, weight) in at.places(pair) {
-                super::super::lanes::add_scaled(&mut out[(row - first) * channels..][..channels], weight, grad);
+                add_scaled(&mut out[(row - first) * channels..][..channels], weight, grad);
             }
         }
     }

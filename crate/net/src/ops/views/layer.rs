@@ -48,8 +48,6 @@ impl Kept {
         self.joint.resize(3 * narrow, 0.0);
         self.inner.resize(2 * narrow, 0.0);
         self.log_sum.resize(rows * heads, 0.0);
-        // Attention adds.
-        self.heard.clear();
         self.heard.resize(narrow, 0.0);
     }
 }

@@ -4,6 +4,9 @@ use std::ops::Range;
 
 use gemm::Parallelism;
 
+use super::super::lanes::each;
+use super::super::wide::wide;
+
 /// A matrix in a slice: where one row and one column further is.
 #[derive(Clone, Copy)]
 pub(super) struct Matrix<'a> {
@@ -103,24 +106,31 @@ impl Linear {
         &self,
         weights: &[f32],
         rows: usize,
-        (x, x_stride): (&[f32], usize),
+        x: (&[f32], usize),
         (y, y_stride): (&mut [f32], usize),
     ) {
-        let bias = &weights[self.bias.clone()];
-        for y in y.chunks_mut(y_stride).take(rows) {
-            for (y, b) in y.iter_mut().zip(bias) {
-                *y += b;
-            }
-        }
-        let weight = Matrix::rows(&weights[self.weight.clone()], self.outputs);
-        let size = [rows, self.inputs, self.outputs];
-        add_product(y, y_stride, size, Matrix::rows(x, x_stride), weight);
+        add_to_rows(&weights[self.bias.clone()], rows, y_stride, y);
+        self.add_weighted(weights, rows, x, (y, y_stride));
     }
 
     /// `y = x W + b` into rows without gaps.
     pub fn set(&self, weights: &[f32], rows: usize, x: (&[f32], usize), y: &mut [f32]) {
-        y[..rows * self.outputs].fill(0.0);
-        self.add(weights, rows, x, (y, self.outputs));
+        for y in y[..rows * self.outputs].chunks_exact_mut(self.outputs) {
+            y.copy_from_slice(&weights[self.bias.clone()]);
+        }
+        self.add_weighted(weights, rows, x, (y, self.outputs));
+    }
+
+    fn add_weighted(
+        &self,
+        weights: &[f32],
+        rows: usize,
+        (x, x_stride): (&[f32], usize),
+        (y, y_stride): (&mut [f32], usize),
+    ) {
+        let weight = Matrix::rows(&weights[self.weight.clone()], self.outputs);
+        let size = [rows, self.inputs, self.outputs];
+        add_product(y, y_stride, size, Matrix::rows(x, x_stride), weight);
     }
 
     /// `dW += x^T dy`, `db += sum dy`.
@@ -131,12 +141,7 @@ impl Linear {
         (x, x_stride): (&[f32], usize),
         (dy, dy_stride): (&[f32], usize),
     ) {
-        let bias = &mut grads[self.bias.clone()];
-        for dy in dy.chunks(dy_stride).take(rows) {
-            for (b, dy) in bias.iter_mut().zip(dy) {
-                *b += dy;
-            }
-        }
+        add_rows(dy, rows, dy_stride, &mut grads[self.bias.clone()]);
         let weight = &mut grads[self.weight.clone()];
         let size = [self.inputs, rows, self.outputs];
         let x = Matrix::rows(x, x_stride).transposed();
@@ -155,5 +160,23 @@ impl Linear {
         let weight = Matrix::rows(&weights[self.weight.clone()], self.outputs).transposed();
         let size = [rows, self.outputs, self.inputs];
         add_product(dx, self.inputs, size, Matrix::rows(dy, dy_stride), weight);
+    }
+}
+
+wide! {
+    /// Adds the same numbers to the beginning of each row.
+    fn add_to_rows(numbers: &[f32], rows: usize, stride: usize, to: &mut [f32]) {
+        for row in 0..rows {
+            each(&mut to[row * stride..][..numbers.len()], [numbers], |to, [number]| to + number);
+        }
+    }
+}
+
+wide! {
+    /// Adds up the beginnings of rows.
+    fn add_rows(from: &[f32], rows: usize, stride: usize, sums: &mut [f32]) {
+        for row in 0..rows {
+            each(sums, [&from[row * stride..]], |sum, [number]| sum + number);
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::super::lanes::{dot, sum};
+use super::super::lanes::{dot, each, sum};
 use super::super::wide::wide;
 
 /// PyTorch's and burn's.
@@ -34,14 +34,10 @@ wide! {
         let rows = x.chunks_exact(channels).zip(normed.chunks_exact_mut(channels));
         for (((x, normed), by), y) in rows.zip(by.iter_mut()).zip(y.chunks_exact_mut(channels)) {
             let mean = sum(x) * share;
-            for (normed, x) in normed.iter_mut().zip(x) {
-                *normed = x - mean;
-            }
+            each(normed, [x], |_, [x]| x - mean);
             *by = 1.0 / (dot(normed, normed) * share + EPSILON).sqrt();
-            for (c, y) in y.iter_mut().enumerate() {
-                normed[c] *= *by;
-                *y = normed[c] * scale[c] + shift[c];
-            }
+            each(normed, [], |n, []| n * *by);
+            each(y, [normed, scale, shift], |_, [n, scale, shift]| n * scale + shift);
         }
     }
 }
@@ -54,20 +50,12 @@ wide! {
         let share = 1.0 / channels as f32;
         let rows = dy.chunks_exact_mut(channels).zip(normed.chunks_exact(channels));
         for (((dy, normed), by), dx) in rows.zip(by).zip(dx.chunks_exact_mut(channels)) {
-            for (grad, dy) in grads[norm.shift.clone()].iter_mut().zip(dy.iter()) {
-                *grad += dy;
-            }
-            for ((grad, dy), n) in grads[norm.scale.clone()].iter_mut().zip(dy.iter()).zip(normed) {
-                *grad += dy * n;
-            }
-            for (dy, scale) in dy.iter_mut().zip(scale) {
-                *dy *= scale;
-            }
+            each(&mut grads[norm.shift.clone()], [dy], |grad, [dy]| grad + dy);
+            each(&mut grads[norm.scale.clone()], [dy, normed], |grad, [dy, n]| grad + dy * n);
+            each(dy, [scale], |dy, [scale]| dy * scale);
             let mean = sum(dy) * share;
             let along = dot(dy, normed) * share;
-            for ((dx, dy), n) in dx.iter_mut().zip(dy.iter()).zip(normed) {
-                *dx += by * (dy - mean - n * along);
-            }
+            each(dx, [dy, normed], |dx, [dy, n]| dx + by * (dy - mean - n * along));
         }
     }
 }
