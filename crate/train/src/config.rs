@@ -147,6 +147,9 @@ pub struct ScheduleConfig {
     /// Samples whose gradients make a step.
     #[serde(default = "one")]
     pub batch: usize,
+    /// The first step from which normalisation goes by its running statistics, which then stay: training sees what use
+    /// sees. Without: never.
+    pub statistics_fixed_from: Option<u64>,
     /// The longest gradient; longer ones are shortened to it. Without: any.
     pub clip: Option<f64>,
     /// The most medium and fine sites of a sample.

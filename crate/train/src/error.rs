@@ -57,6 +57,9 @@ pub enum TrainError {
         /// How many in a row.
         steps: u64,
     },
+    /// No thread to prepare samples on.
+    #[error("expected a thread to prepare samples on, found \"{0}\"; lower data.threads")]
+    Thread(std::io::Error),
     /// A thread that prepares samples ended by itself.
     #[error("a thread that prepares samples broke off; what it printed above says why")]
     Worker,

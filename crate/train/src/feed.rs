@@ -33,12 +33,15 @@ struct Queue<T> {
 impl<T: Send + 'static> Feed<T> {
     /// Starts `threads` threads that make items from number `first` on, at most `ahead` of them before they are asked
     /// for. `worker` is called once on each thread and gives what makes an item from its number.
+    ///
+    /// # Errors
+    /// When the system has no thread to give.
     pub fn start<M>(
         threads: usize,
         ahead: usize,
         first: u64,
         worker: impl Fn() -> M + Send + Sync + 'static,
-    ) -> Self
+    ) -> Result<Self, TrainError>
     where
         M: FnMut(u64) -> Result<T, TrainError>,
     {
@@ -57,19 +60,21 @@ impl<T: Send + 'static> Feed<T> {
         let threads = (0..threads.max(1))
             .map(|_| {
                 let (shared, worker) = (shared.clone(), worker.clone());
-                std::thread::spawn(move || {
+                let work = move || {
                     let watch = Watch(&shared);
                     shared.work(worker());
                     std::mem::forget(watch);
-                })
+                };
+                let builder = std::thread::Builder::new().name("samples".to_owned());
+                builder.spawn(work).map_err(TrainError::Thread)
             })
-            .collect();
-        Self {
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
             shared,
             threads,
             waited: Duration::ZERO,
             handed_out: 0,
-        }
+        })
     }
 
     /// The next item, waited for if need be.

@@ -3,7 +3,7 @@
 use crate::config::TrainConfig;
 use crate::cost;
 use crate::error::TrainError;
-use crate::task::{Moment, Outcome, Task, seeded};
+use crate::task::{Descent, Moment, Outcome, Task, seeded};
 use burn::tensor::Device;
 use net::fusion::Pooling;
 use net::loss::{LossOptions, loss};
@@ -42,15 +42,18 @@ impl Task for Network {
     }
 
     fn look(&self, model: &Ipdrecon, sample: &Sample, moment: &Moment, device: &Device) -> Outcome {
+        let taught = moment.descent == Descent::Taught;
+        let [most_medium, most_fine] = self.most_sites;
         let options = LossOptions {
             pooling: if moment.fine_tune {
                 Pooling::Softmax
             } else {
                 Pooling::Mean
             },
-            most_sites: self.most_sites,
+            // Alone, every medium voxel is needed to count what was missed.
+            most_sites: [if taught { most_medium } else { usize::MAX }, most_fine],
             seed: moment.seed,
-            teacher: moment.training,
+            teacher: taught,
         };
         let size = self.size.map(|side| side as usize);
         let found = loss(model, sample, size, &options, device);
@@ -60,9 +63,13 @@ impl Task for Network {
             .map(|(name, part)| (logged(name), part))
             .collect();
         parts.push(("distance_error_m", found.distance_error_m));
-        let [coarse, medium] = found
+        let [coarse, mut medium] = found
             .occupancy
             .map(|found| [found.hits, found.false_alarms, found.misses]);
+        if !taught {
+            // What lies below coarse voxels that were missed is missed too.
+            medium[2] = occupied_medium(sample) - medium[0];
+        }
         Outcome {
             total: found.total,
             parts,
@@ -96,6 +103,15 @@ impl Task for Network {
         }
         weights::load(bytes, device).map_err(unfit)
     }
+}
+
+/// Medium voxels that are known to be occupied.
+fn occupied_medium(sample: &Sample) -> usize {
+    let truth = &sample.truth;
+    let voxels = truth.occupied[1].iter().zip(&truth.supervised[1]);
+    voxels
+        .filter(|(occupied, known)| **occupied && **known)
+        .count()
 }
 
 /// Parts of the loss begin with `loss_` in the log.

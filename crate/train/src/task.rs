@@ -13,8 +13,18 @@ pub struct Moment {
     pub seed: u64,
     /// Phase 2: weighted pooling.
     pub fine_tune: bool,
-    /// A sample to learn from, not to be judged by.
-    pub training: bool,
+    /// Which voxels are divided.
+    pub descent: Descent,
+}
+
+/// Which voxels of a level are divided into those of the next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Descent {
+    /// Those that are occupied or that the network believes to be, up to a number: to learn. Losses of two networks can be
+    /// compared, since a level is never spared for want of voxels.
+    Taught,
+    /// Those that the network believes to be occupied, as in use: to be judged.
+    Alone,
 }
 
 /// A sample's loss, and how right the network was.

@@ -11,8 +11,8 @@ use crate::error::TrainError;
 use crate::feed::Feed;
 use crate::log::{self, Log};
 use crate::plot;
-use crate::task::{Moment, Outcome, Task};
-use burn::module::Module;
+use crate::task::{Descent, Moment, Outcome, Task};
+use burn::module::{Flag, Module, ModuleMapper, Param};
 use burn::optim::{GradientsAccumulator, GradientsParams};
 use burn::tensor::{Device, Tensor};
 use net::sample::Sample;
@@ -37,6 +37,8 @@ pub struct Trainer<T: Task> {
     started: Instant,
     best: Option<f64>,
     skipped: u64,
+    /// Whether normalisation goes by its running statistics.
+    fixed: bool,
     peak_gflops: f64,
     feed: Feed<Sample>,
     validation: Option<Validation>,
@@ -86,7 +88,7 @@ impl<T: Task> Trainer<T> {
         let feed = Feed::start(config.data.threads, config.data.ahead, first, move || {
             let mut sampler = Sampler::new(training.clone(), options);
             move |number| sampler.sample(number)
-        });
+        })?;
         let validation = held_out.map(|set| Validation::new(set, &config));
         let mut log = Log::open(&config.output.folder, step)?;
         let peak_gflops = cost::peak_gflops(&device);
@@ -108,6 +110,7 @@ impl<T: Task> Trainer<T> {
             started: Instant::now(),
             best: state.and_then(|state| state.best),
             skipped: 0,
+            fixed: false,
             peak_gflops,
             feed,
             validation,
@@ -192,6 +195,11 @@ impl<T: Task> Trainer<T> {
     /// One step; gives a line to show where one is due.
     fn train_step(&mut self) -> Result<Option<String>, TrainError> {
         let started = Instant::now();
+        let fixed_from = self.config.train.statistics_fixed_from;
+        if !self.fixed && fixed_from.is_some_and(|from| self.step >= from) {
+            self.model = fix_statistics(self.model.clone());
+            self.fixed = true;
+        }
         let waited_before = self.feed.waited();
         let batch = self.config.train.batch;
         let device = self.device.clone().autodiff();
@@ -203,7 +211,7 @@ impl<T: Task> Trainer<T> {
             let moment = Moment {
                 seed: self.config.seed ^ (self.step * batch as u64 + k as u64),
                 fine_tune: self.config.fine_tunes(self.step),
-                training: true,
+                descent: Descent::Taught,
             };
             let outcome = self.task.look(&self.model, &sample, &moment, &device);
             macs += self
@@ -314,6 +322,21 @@ impl<T: Task> Trainer<T> {
     }
 }
 
+/// From here on normalisation goes by its running statistics, which stay as they are, in training as in use.
+fn fix_statistics<M: Module>(model: M) -> M {
+    // The statistics lag one update behind until somebody asks for a copy to look with.
+    drop(model.valid());
+    model.map(&mut Fix)
+}
+
+struct Fix;
+
+impl ModuleMapper for Fix {
+    fn map_flag(&mut self, flag: Param<Flag>) -> Param<Flag> {
+        flag.with_value(false)
+    }
+}
+
 /// How samples are made for a configuration.
 fn sample_options(config: &TrainConfig, augment: Augment) -> SampleOptions {
     SampleOptions {
@@ -376,6 +399,14 @@ impl Numbers {
         }
         self.samples += 1.0;
         outcome.total
+    }
+
+    /// Takes the occupancy of others.
+    fn with_occupancy(self, other: Self) -> Self {
+        Self {
+            occupancy: other.occupancy,
+            ..self
+        }
     }
 
     /// The mean loss.

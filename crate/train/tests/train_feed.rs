@@ -23,7 +23,8 @@ fn samples(threads: usize, first: u64, count: usize) -> Vec<Sample> {
     let mut feed = Feed::start(threads, 5, first, move || {
         let mut sampler = Sampler::new(set.clone(), options);
         move |number| sampler.sample(number)
-    });
+    })
+    .unwrap();
     (0..count).map(|_| feed.take().unwrap()).collect()
 }
 
@@ -80,7 +81,8 @@ fn no_more_is_made_ahead_than_asked_and_waiting_is_measured() {
             std::thread::sleep(Duration::from_millis(20 - number.min(20)));
             Ok(number)
         }
-    });
+    })
+    .unwrap();
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(made.load(Ordering::SeqCst), 6);
     let handed: Vec<u64> = (0..20).map(|_| feed.take().unwrap()).collect();
@@ -98,7 +100,8 @@ fn a_fault_is_handed_on_in_its_turn_and_a_broken_thread_is_noticed() {
             2 => Err(TrainError::Worker),
             _ => Ok(number),
         }
-    });
+    })
+    .unwrap();
     assert_eq!(feed.take().unwrap(), 0);
     assert_eq!(feed.take().unwrap(), 1);
     assert!(feed.take().is_err());
@@ -109,7 +112,8 @@ fn a_fault_is_handed_on_in_its_turn_and_a_broken_thread_is_noticed() {
             assert!(number < 1, "this thread is meant to break off");
             Ok(number)
         }
-    });
+    })
+    .unwrap();
     assert_eq!(broken.take().unwrap(), 0);
     assert!(matches!(broken.take(), Err(TrainError::Worker)));
 }

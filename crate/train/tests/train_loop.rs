@@ -140,6 +140,26 @@ fn a_time_limit_ends_with_a_checkpoint() {
 }
 
 #[test]
+fn fixed_statistics_stay_and_resume_exactly() {
+    let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+    let [whole, halves] = folders.each_ref().map(|f| f.path());
+    let config = |folder: &Path, steps: u64| {
+        let mut config = common::settings(folder, steps);
+        config.train.statistics_fixed_from = Some(7);
+        config
+    };
+    let before = numbers(&run(config(halves, 7), None).0.model());
+    let (resumed, _) = run(config(halves, 14), Some(Checkpoint::read(halves).unwrap()));
+    let (straight, _) = run(config(whole, 14), None);
+    let after = numbers(&resumed.model());
+    assert_eq!(after, numbers(&straight.model()));
+    for ((name, before), (_, after)) in before.iter().zip(&after) {
+        let statistics = name.contains("running");
+        assert_eq!(before == after, statistics, "{name}");
+    }
+}
+
+#[test]
 fn the_rate_warms_up_and_falls() {
     let config = common::settings(Path::new("anywhere"), 20);
     let rates: Vec<f64> = [0, 1, 3, 8, 11, 12, 19]
@@ -169,7 +189,7 @@ fn adam_is_burns() {
     let moment = train::task::Moment {
         seed: 0,
         fine_tune: false,
-        training: true,
+        descent: train::task::Descent::Taught,
     };
     for step in 0..5 {
         let sample = sampler.sample(step).unwrap();

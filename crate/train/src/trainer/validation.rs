@@ -5,7 +5,7 @@ use crate::config::TrainConfig;
 use crate::data::{Augment, Sampler, ScanSet};
 use crate::error::TrainError;
 use crate::feed::Feed;
-use crate::task::{Moment, Task};
+use crate::task::{Descent, Moment, Task};
 use burn::tensor::Device;
 use net::sample::Sample;
 use std::sync::Arc;
@@ -30,7 +30,7 @@ impl Validation {
         }
     }
 
-    /// Means over the held-out samples.
+    /// Means over the held-out samples: losses as in training, occupancy as in use.
     pub(super) fn look<T: Task>(
         &mut self,
         task: &T,
@@ -39,16 +39,19 @@ impl Validation {
         device: &Device,
     ) -> Result<Numbers, TrainError> {
         self.make()?;
-        let mut numbers = Numbers::default();
-        for (number, sample) in self.samples.iter().enumerate() {
-            let moment = Moment {
-                seed: number as u64,
-                fine_tune,
-                training: false,
-            };
-            numbers.add(task.look(model, sample, &moment, device));
-        }
-        Ok(numbers)
+        let [taught, alone] = [Descent::Taught, Descent::Alone].map(|descent| {
+            let mut numbers = Numbers::default();
+            for (number, sample) in self.samples.iter().enumerate() {
+                let moment = Moment {
+                    seed: number as u64,
+                    fine_tune,
+                    descent,
+                };
+                numbers.add(task.look(model, sample, &moment, device));
+            }
+            numbers
+        });
+        Ok(taught.with_occupancy(alone))
     }
 
     fn make(&mut self) -> Result<(), TrainError> {
@@ -69,7 +72,7 @@ impl Validation {
         let mut feed = Feed::start(self.config.data.threads, wanted, 0, move || {
             let mut sampler = Sampler::new(set.clone(), options);
             move |number| sampler.sample(number)
-        });
+        })?;
         self.samples = (0..wanted).map(|_| feed.take()).collect::<Result<_, _>>()?;
         Ok(())
     }
