@@ -140,12 +140,30 @@ fn shares() {
 
 #[test]
 #[ignore = "a measurement"]
-fn backbone_only() {
+fn whole_only() {
     let device = Device::flex().autodiff();
     let net = PlaneNet::init(&NetConfig::small(), &device);
-    for _ in 0..8 {
-        timed(&[[VIEWS, 3, 240, 320]], &device, |x| {
-            net.backbone.forward(x.into_iter().next().unwrap()).to_vec()
+    let camera = Pinhole {
+        width: 160,
+        height: 120,
+        fx: 160.0,
+        fy: 160.0,
+        cx: 80.0,
+        cy: 60.0,
+    };
+    let views = vec![
+        View {
+            camera,
+            world_from_camera: Affine3A::IDENTITY,
+        };
+        VIEWS
+    ];
+    for _ in 0..20 {
+        let found = timed(&[[VIEWS, 3, 120, 160]], &device, |x| {
+            let planes = net.forward(x.into_iter().next().unwrap(), &views);
+            let parts = planes.map(|p| [Some(p.base), p.hidden, p.confidence]);
+            parts.into_iter().flatten().flatten().collect()
         });
+        println!("{found:.2?}");
     }
 }

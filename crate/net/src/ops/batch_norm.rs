@@ -9,7 +9,7 @@ use burn_flex::FlexTensor;
 use rayon::prelude::*;
 
 use super::flex;
-use super::wide::{LANES, wide};
+use super::wide::wide;
 
 #[cfg(not(target_family = "wasm"))]
 mod backward;
@@ -113,6 +113,9 @@ pub trait BatchNormalisation: Backend {
 }
 
 impl BatchNormalisation for CubeBackend {}
+
+/// Numbers that a sum keeps apart, so that it runs in wide registers.
+const LANES: usize = 16;
 
 wide! {
     fn scale_plane(x: &[f32], y: &mut [f32], scale: f32, shift: f32, relu: bool) {

@@ -8,8 +8,8 @@ use burn_cubecl::CubeBackend;
 use burn_flex::FlexTensor;
 use rayon::prelude::*;
 
-use super::flex;
-use super::wide::{LANES, wide};
+use super::wide::wide;
+use super::{flex, lanes};
 
 /// Convolves each channel of `x` `[V, C, H, W]` with its kernel of `weight` `[C, 1, K, K]`, `K` odd. Output pixel `i` is
 /// centred on input pixel `stride * i`, zeros lie outside; `[V, C, ceil(H / stride), ceil(W / stride)]`.
@@ -193,18 +193,9 @@ wide! {
 }
 
 wide! {
-    /// Products summed: `sum_i a_i b_i`.
+    /// `sum_i a_i b_i`.
     fn dot(a: &[f32], b: &[f32]) -> f32 {
-        let mut parts = [0.0_f32; LANES];
-        let (chunks_a, chunks_b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-        let rest = chunks_a.remainder().iter().zip(chunks_b.remainder());
-        let rest: f32 = rest.map(|(a, b)| a * b).sum();
-        for (a, b) in chunks_a.zip(chunks_b) {
-            for i in 0..LANES {
-                parts[i] += a[i] * b[i];
-            }
-        }
-        parts.iter().sum::<f32>() + rest
+        lanes::dot(a, b)
     }
 }
 

@@ -8,8 +8,8 @@ use burn_cubecl::CubeBackend;
 use burn_flex::FlexTensor;
 use rayon::prelude::*;
 
-use super::flex;
-use super::wide::{sum, wide};
+use super::wide::wide;
+use super::{flex, lanes};
 
 /// `y = W x (+ b)` at each pixel: `x` `[V, C, h, w]`, `weight` `[C', C, 1, 1]`, `bias` `[C']`; `[V, C', h, w]`. A 1x1
 /// convolution whose gradients are matrix products; those that burn composes take four times as long on the processor.
@@ -69,6 +69,12 @@ impl Pointwise for Flex {
         let of_planes: Vec<f32> = x.par_chunks(pixels).map(sum).collect();
         let of_channel = |c| (0..views).map(|v| of_planes[v * channels + c]).sum();
         flex::tensor((0..channels).map(of_channel).collect(), [channels].into())
+    }
+}
+
+wide! {
+    fn sum(values: &[f32]) -> f32 {
+        lanes::sum(values)
     }
 }
 

@@ -25,21 +25,3 @@ macro_rules! wide {
     };
 }
 pub(crate) use wide;
-
-/// Numbers that a sum keeps apart, so that it runs in wide registers.
-pub(crate) const LANES: usize = 16;
-
-wide! {
-    /// Sum in 16 interleaved parts.
-    pub(crate) fn sum(values: &[f32]) -> f32 {
-        let mut parts = [0.0_f32; LANES];
-        let chunks = values.chunks_exact(LANES);
-        let rest: f32 = chunks.remainder().iter().sum();
-        for chunk in chunks {
-            for (part, value) in parts.iter_mut().zip(chunk) {
-                *part += value;
-            }
-        }
-        parts.iter().sum::<f32>() + rest
-    }
-}
