@@ -26,6 +26,9 @@ struct Queue<T> {
     /// What is begun next.
     next: u64,
     ready: BTreeMap<u64, Result<T, TrainError>>,
+    /// Time that the threads spent on making items, and how many.
+    making: Duration,
+    made: u32,
     stopped: bool,
     broken: bool,
 }
@@ -50,6 +53,8 @@ impl<T: Send + 'static> Feed<T> {
                 wanted: first,
                 next: first,
                 ready: BTreeMap::new(),
+                making: Duration::ZERO,
+                made: 0,
                 stopped: false,
                 broken: false,
             }),
@@ -106,6 +111,12 @@ impl<T: Send + 'static> Feed<T> {
         self.waited
     }
 
+    /// The mean time that a thread took for an item.
+    pub fn mean_making(&self) -> Duration {
+        let queue = self.shared.lock();
+        queue.making / queue.made.max(1)
+    }
+
     /// How many items were handed out.
     pub fn handed_out(&self) -> u64 {
         self.handed_out
@@ -141,8 +152,13 @@ impl<T> Shared<T> {
             let number = queue.next;
             queue.next += 1;
             drop(queue);
+            let started = Instant::now();
             let item = make(number);
-            self.lock().ready.insert(number, item);
+            let mut queue = self.lock();
+            queue.making += started.elapsed();
+            queue.made += 1;
+            queue.ready.insert(number, item);
+            drop(queue);
             self.changed.notify_all();
         }
     }

@@ -89,6 +89,7 @@ fn no_more_is_made_ahead_than_asked_and_waiting_is_measured() {
     assert_eq!(handed, (0..20).collect::<Vec<u64>>());
     assert_eq!(feed.handed_out(), 20);
     assert!(feed.waited() > Duration::ZERO);
+    assert!(feed.mean_making() >= Duration::from_millis(5));
     drop(feed);
     assert!(made.load(Ordering::SeqCst) <= 26);
 }

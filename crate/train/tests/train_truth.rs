@@ -5,6 +5,7 @@ mod common;
 
 use glam::{DVec3, Vec3};
 use std::rc::Rc;
+use train::data::ScanSet;
 use train::data::volume::{SATURATED, TruthVolume, VOXEL_M};
 
 fn volume_of(seed: u64, frames: usize) -> (std::sync::Arc<TruthVolume>, scan::Scan) {
@@ -128,10 +129,52 @@ fn a_scan_without_depth_says_so() {
         let source = scan::MemorySource::new(color_only.clone());
         Ok(scan::open(Rc::new(source)).unwrap())
     };
-    let made = train::data::ScanSet::new(&["attic".to_owned()], std::sync::Arc::new(open), 4, 3.0);
+    let made = ScanSet::new(&["attic".to_owned()], std::sync::Arc::new(open), 4, 3.0);
     let said = made.err().unwrap().to_string();
     assert!(
         said.starts_with("attic: expected depth images") && said.contains("leave it out"),
+        "{said}"
+    );
+}
+
+#[test]
+fn scans_in_a_folder_are_found_and_their_truth_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    for seed in [3, 1] {
+        for (path, bytes) in common::room(seed, 6, 64, 48).files() {
+            let file = folder.path().join(format!("rooms/room-{seed}")).join(path);
+            std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+            std::fs::write(file, bytes).unwrap();
+        }
+    }
+    let cache = folder.path().join("cache");
+    let paths = [folder.path().join("rooms/*")];
+    let set = || ScanSet::from_paths(&paths, 6, 8.0, Some(cache.clone())).unwrap();
+    let first = set();
+    let names: Vec<&str> = first
+        .entries
+        .iter()
+        .map(|entry| entry.name.as_str())
+        .collect();
+    assert!(names[0].ends_with("room-1") && names[1].ends_with("room-3") && names.len() == 2);
+    let truth = first.truth(1, &first.open(1).unwrap()).unwrap();
+    let kept: Vec<_> = std::fs::read_dir(&cache).unwrap().collect();
+    assert_eq!(kept.len(), 1);
+    // Another run takes what is kept: even a truth that was made to differ.
+    let file = kept[0].as_ref().unwrap().path();
+    let mut other = truth.as_ref().clone();
+    other.values[0] = 5;
+    other.near += 1;
+    other.write(&file).unwrap();
+    let second = set();
+    assert_eq!(*second.truth(1, &second.open(1).unwrap()).unwrap(), other);
+    // Scans with fewer frames than asked are told by name.
+    let said = ScanSet::from_paths(&paths, 7, 8.0, None)
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(
+        said.contains("room-1: expected at least 7 frames") && said.contains("found 6"),
         "{said}"
     );
 }

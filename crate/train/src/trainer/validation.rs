@@ -1,6 +1,7 @@
 //! A look at scans that the network never learns from: always the same samples, without augmentation.
 
-use super::{Numbers, sample_options};
+use super::numbers::Numbers;
+use super::sample_options;
 use crate::config::TrainConfig;
 use crate::data::{Augment, Sampler, ScanSet};
 use crate::error::TrainError;
