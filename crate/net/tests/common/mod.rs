@@ -3,6 +3,7 @@
 
 #[macro_use]
 pub mod devices;
+pub mod digests;
 pub mod golden;
 
 /// `count` numbers in [-scale, scale) that `name` decides: FNV-1a of the name, then SplitMix64 of that plus the index.
