@@ -74,6 +74,10 @@ impl Block {
     pub fn forward(&mut self, from: Sources<'_>, offsets: &[i32], x: &mut [f32]) {
         let pairs = pairs(offsets);
         let (c, rows) = (from.shape.channels, pairs.len());
+        // Voxels that no view sees.
+        if rows == 0 {
+            return;
+        }
         let wide = c + from.shape.extra;
         self.input.resize(rows * wide, 0.0);
         gather(from, pairs.start, &mut self.input);
@@ -112,6 +116,9 @@ impl Block {
         grads: &mut [f32],
     ) {
         let (c, rows) = (from.shape.channels, pairs(offsets).len());
+        if rows == 0 {
+            return;
+        }
         let wide = c + from.shape.extra;
         for (layer, kept) in from.layout.layers.iter().zip(&self.kept).rev() {
             let room = (&mut self.room, &mut self.scratch);
