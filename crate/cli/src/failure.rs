@@ -113,6 +113,9 @@ pub enum Failure {
         /// What is wrong with it.
         error: String,
     },
+    /// No GPU that makes pictures.
+    #[error(transparent)]
+    Rays(#[from] synth::GpuError),
     /// Threads that the system refuses to start.
     #[error("expected to start {wanted} threads: {error}; ask for fewer with --threads")]
     Threads {

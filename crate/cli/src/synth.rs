@@ -1,8 +1,8 @@
 //! `ipdrecon synth`: scans of rooms made by rule, a folder a seed, in the 7-Scenes layout with Z up.
 
 use crate::{failure::Failure, progress::bar};
-use ::synth::{Frame, TrainingScan};
-use clap::Args;
+use ::synth::{Frame, GpuTracer, TrainingScan};
+use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 use std::{
     fs,
@@ -31,9 +31,33 @@ pub struct Arguments {
     /// Depth with the noise and the reach of a sensor instead of exact depth.
     #[arg(long)]
     noisy_depth: bool,
+    /// What casts the rays: a graphics card where there is one, or else the processor.
+    #[arg(long, value_enum, default_value_t = Caster::Auto)]
+    device: Caster,
     /// Threads that draw; all cores without it.
     #[arg(long, value_name = "COUNT")]
     threads: Option<usize>,
+}
+
+/// What casts the rays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Caster {
+    /// A graphics card, or else the processor.
+    Auto,
+    /// The processor.
+    Cpu,
+    /// A graphics card, or a program that plays one.
+    Gpu,
+}
+
+impl Caster {
+    fn open(self) -> Result<Option<GpuTracer>, Failure> {
+        match self {
+            Self::Auto => Ok(GpuTracer::open(false).ok()),
+            Self::Cpu => Ok(None),
+            Self::Gpu => Ok(Some(GpuTracer::open(true)?)),
+        }
+    }
 }
 
 fn seeds(text: &str) -> Result<Range<u64>, String> {
@@ -68,6 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             wanted,
             error: error.to_string(),
         })?;
+    let gpu = arguments.device.open()?;
     let seeds: Vec<u64> = arguments.seeds.clone().collect();
     let bar = bar("rooms", seeds.len());
     let made = AtomicUsize::new(0);
@@ -76,7 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         seeds.par_iter().try_for_each(|&seed| {
             let folder = arguments.output.join(format!("room-{seed:06}"));
             if !folder.exists() {
-                write_room(arguments, seed, &folder)?;
+                write_room(arguments, gpu.as_ref(), seed, &folder)?;
                 made.fetch_add(1, Ordering::Relaxed);
             }
             bar.inc(1);
@@ -87,8 +112,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (made, seconds) = (made.into_inner(), start.elapsed().as_secs_f64());
     let kept = seeds.len() - made;
     let mut line = format!(
-        "{made} scans of {} pictures in {seconds:.1} s: {:.1} scans a minute",
+        "{made} scans of {} pictures in {seconds:.1} s on {}: {:.1} scans a minute",
         arguments.frames,
+        gpu.as_ref().map_or("the processor", GpuTracer::name),
         60.0 * made as f64 / seconds
     );
     if kept > 0 {
@@ -99,7 +125,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// Writes one scan under another name first, so that a folder of the right name is always whole.
-fn write_room(arguments: &Arguments, seed: u64, folder: &Path) -> Result<(), Failure> {
+fn write_room(
+    arguments: &Arguments,
+    gpu: Option<&GpuTracer>,
+    seed: u64,
+    folder: &Path,
+) -> Result<(), Failure> {
     let (width, height) = arguments.size[(seed % arguments.size.len() as u64) as usize];
     let scan = TrainingScan::new(seed, arguments.frames as usize, width, height);
     let part = folder.with_extension("part");
@@ -111,8 +142,7 @@ fn write_room(arguments: &Arguments, seed: u64, folder: &Path) -> Result<(), Fai
     for (name, text) in scan.texts() {
         write(&name, text.as_bytes())?;
     }
-    (0..scan.views().len()).into_par_iter().try_for_each(|i| {
-        let frame = scan.frame(i);
+    let write_frame = |i: usize, frame: Frame| {
         let stem = format!("frame-{i:06}");
         let refused = |error: String| Failure::Picture {
             path: part.join(&stem),
@@ -127,7 +157,22 @@ fn write_room(arguments: &Arguments, seed: u64, folder: &Path) -> Result<(), Fai
         let depth_m = sensed.as_deref().unwrap_or(&frame.depth_m);
         let depth = depth_png(&frame, depth_m).map_err(|error| refused(error.to_string()))?;
         write(&format!("{stem}.depth.png"), &depth)
-    })?;
+    };
+    let count = scan.views().len();
+    match gpu {
+        None => (0..count)
+            .into_par_iter()
+            .try_for_each(|i| write_frame(i, scan.frame(i)))?,
+        Some(gpu) => {
+            let most = gpu.most_frames(width, height);
+            for from in (0..count).step_by(most) {
+                let gathered = gpu.gather(&scan, from..count.min(from + most))?;
+                gathered
+                    .par_iter()
+                    .try_for_each(|rays| write_frame(rays.index, scan.frame_of(rays)))?;
+            }
+        }
+    }
     fs::rename(&part, folder).map_err(|error| Failure::file("write", folder, error))
 }
 

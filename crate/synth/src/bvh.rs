@@ -131,6 +131,19 @@ impl Bvh {
         self.order[start..end].sort_by(|a, b| key(a).total_cmp(&key(b)));
     }
 
+    /// Corners, first and count of every node; a node without a count has the two children `first` and `first + 1`.
+    #[cfg(feature = "gpu")]
+    pub fn nodes(&self) -> impl Iterator<Item = (Vec3, Vec3, u32, u32)> {
+        let node = |node: &Node| (node.low.into(), node.high.into(), node.first, node.count);
+        self.nodes.iter().map(node)
+    }
+
+    /// The solids in the order in which leaves name them.
+    #[cfg(feature = "gpu")]
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
     /// Walks the boxes a ray crosses, nearest first. `visit` gets a solid and the distance that still matters, and
     /// gives the new one; 0 ends the walk.
     pub fn walk_ray(

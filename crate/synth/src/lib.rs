@@ -29,4 +29,6 @@ pub use path::{CLEARANCE_M, View, path};
 pub use room::Room;
 pub use sample::SampleScan;
 pub use trace::{Frame, depth, render};
+#[cfg(feature = "gpu")]
+pub use training::{Gathered, GpuError, GpuTracer};
 pub use training::{TrainingRoom, TrainingScan};

@@ -9,7 +9,7 @@ use crate::solid::{Solid, Touch};
 #[derive(Clone, Debug)]
 pub(crate) struct Scene {
     pub solids: Vec<Solid>,
-    bvh: Bvh,
+    pub bvh: Bvh,
 }
 
 /// Where a ray meets a scene.

@@ -3,6 +3,8 @@
 mod camera;
 mod colors;
 mod furnish;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod light;
 mod pieces;
 mod place;
@@ -16,5 +18,7 @@ mod walk;
 mod walls;
 mod wishes;
 
+#[cfg(feature = "gpu")]
+pub use gpu::{Gathered, GpuError, GpuTracer};
 pub use room::TrainingRoom;
 pub use scan::TrainingScan;

@@ -34,34 +34,43 @@ pub(crate) struct Point {
 pub(crate) fn trace(room: &TrainingRoom, view: &View) -> Linear {
     let (width, height) = (view.camera.width as usize, view.camera.height as usize);
     let mut points = Vec::with_capacity(width * height);
-    let mut depth_m = Vec::with_capacity(width * height);
     for v in 0..height {
         for u in 0..width {
-            let ray = view.ray(u as f32, v as f32);
-            let length = ray.length();
-            let point = look(room, view, ray / length);
-            depth_m.push(point.t / length);
-            points.push(point);
+            points.push(look(room, view, view.ray(u as f32, v as f32).normalize()));
         }
     }
     let probes = probes();
-    let mut light: Vec<_> = (0..points.len())
+    let light = (0..points.len())
         .map(|i| {
             let probe = &probes[i / width % BLOCK * BLOCK + i % width % BLOCK];
             arriving(room, &points[i], probe)
         })
         .collect();
-    smooth(&points, &mut light, width);
+    finish(room, view, &points, light)
+}
+
+/// The picture, once rays have told what they met and what light is there.
+pub(crate) fn finish(
+    room: &TrainingRoom,
+    view: &View,
+    points: &[Point],
+    mut light: Vec<Arriving>,
+) -> Linear {
+    let width = view.camera.width as usize;
+    smooth(points, &mut light, width);
     let mut color: Vec<_> = points
         .iter()
         .zip(&light)
         .map(|(point, light)| shade(room, point, light))
         .collect();
-    soften_edges(room, view, &points, &light, &mut color);
+    soften_edges(room, view, points, &light, &mut color);
+    let depth = |(i, point): (usize, &Point)| {
+        point.t / view.ray((i % width) as f32, (i / width) as f32).length()
+    };
     Linear {
         width,
         color,
-        depth_m,
+        depth_m: points.iter().enumerate().map(depth).collect(),
     }
 }
 
@@ -71,9 +80,8 @@ pub(crate) fn depth(room: &TrainingRoom, view: &View) -> Vec<f32> {
     (0..width * height)
         .map(|i| {
             let ray = view.ray((i % width) as f32, (i / width) as f32);
-            let length = ray.length();
-            let hit = room.scene.cast(view.position_m, ray / length, FAR_M);
-            hit.map_or(0.0, |hit| hit.t / length)
+            let hit = room.scene.cast(view.position_m, ray.normalize(), FAR_M);
+            hit.map_or(0.0, |hit| hit.t / ray.length())
         })
         .collect()
 }
@@ -86,26 +94,29 @@ fn look(room: &TrainingRoom, view: &View, dir: Vec3) -> Point {
             ..Point::default()
         };
     };
-    let solid = &room.scene.solids[hit.solid as usize];
-    let at = origin + dir * hit.t;
-    // A slanting surface spreads over more metres a pixel.
-    let slant = (-dir.dot(hit.normal)).max(0.25);
-    let pixel_m = hit.t / view.camera.fx as f32 / slant.sqrt();
-    let local_normal = solid.axes.transpose_mul_vec3(hit.normal);
-    let albedo = solid.look.colour(
-        solid.to_local(at),
-        local_normal,
-        solid.shape.half_size(),
-        pixel_m,
-    );
-    Point {
+    let mut point = Point {
         solid: hit.solid,
         t: hit.t,
-        at,
+        at: origin + dir * hit.t,
         normal: hit.normal,
-        albedo,
+        albedo: Vec3::ZERO,
         dir,
-    }
+    };
+    paint(room, view, &mut point);
+    point
+}
+
+/// Finds the albedo of a point.
+pub(crate) fn paint(room: &TrainingRoom, view: &View, point: &mut Point) {
+    let solid = &room.scene.solids[point.solid as usize];
+    // A slanting surface spreads over more metres a pixel.
+    let slant = (-point.dir.dot(point.normal)).max(0.25);
+    let pixel_m = point.t / view.camera.fx as f32 / slant.sqrt();
+    let normal = solid.axes.transpose_mul_vec3(point.normal);
+    let at = solid.to_local(point.at);
+    point.albedo = solid
+        .look
+        .colour(at, normal, solid.shape.half_size(), pixel_m);
 }
 
 /// Averages soft light over 4 by 4 pixels and the bounce over 8 by 8, as far as they belong to one smooth surface.

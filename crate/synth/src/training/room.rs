@@ -14,7 +14,7 @@ use crate::training::plan::{HALF_WALL_M, Plan};
 use crate::training::shell::{Daylight, build};
 
 /// More lights than this are not looked at: the weakest go.
-const MOST_LIGHTS: usize = 10;
+pub(crate) const MOST_LIGHTS: usize = 10;
 
 /// Furnished rooms to learn from, in metres: the floor is z = 0, Z is up.
 #[derive(Clone, Debug)]

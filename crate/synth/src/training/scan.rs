@@ -7,7 +7,7 @@ use crate::path::View;
 use crate::random::{Random, hash_unit};
 use crate::trace::Frame;
 use crate::training::camera::{Sensor, mean_color, pinhole};
-use crate::training::render::{depth, trace};
+use crate::training::render::{Linear, depth, trace};
 use crate::training::room::TrainingRoom;
 use crate::training::walk::walk;
 
@@ -74,7 +74,23 @@ impl TrainingScan {
     /// Colour as the camera saves it, and exact depth, of frame `index`.
     pub fn frame(&self, index: usize) -> Frame {
         let view = &self.views[index];
-        let linear = trace(&self.room, view);
+        self.developed(index, trace(&self.room, view))
+    }
+
+    /// [`TrainingScan::frame`] from rays that a GPU has cast.
+    #[cfg(feature = "gpu")]
+    pub fn frame_of(&self, gathered: &crate::training::gpu::Gathered) -> Frame {
+        use crate::training::render::{finish, paint};
+        let view = &self.views[gathered.index];
+        let (mut points, light) = gathered.read(&self.room, view);
+        for point in points.iter_mut().filter(|point| point.t > 0.0) {
+            paint(&self.room, view, point);
+        }
+        self.developed(gathered.index, finish(&self.room, view, &points, light))
+    }
+
+    fn developed(&self, index: usize, linear: Linear) -> Frame {
+        let view = &self.views[index];
         let next = self.views.get(index + 1);
         Frame {
             width: view.camera.width,
