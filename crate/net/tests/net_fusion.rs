@@ -9,12 +9,12 @@ use common::devices::values;
 use common::golden::{check, part};
 use glam::{Affine3A, IVec3, Mat3, Vec3};
 use mesh::camera::Pinhole;
+use net::View;
 use net::fusion::{Fusion, FusionConfig, PairTensors, Pairs, Pooling};
 use net::guide::guide_channels;
 use net::ops::rows::sample;
 use net::planes::Plane;
 use net::sample::GuideMap;
-use net::{Level, NetConfig, View};
 use serde_json::Value;
 
 const CHANNELS: usize = 16;
@@ -298,6 +298,7 @@ impl burn::module::ModuleVisitor for Slopes<'_> {
 #[cfg(not(target_family = "wasm"))]
 #[test]
 fn parameters_are_those_of_the_method() {
+    use net::{Level, NetConfig};
     let device = Device::flex();
     let count = |config: &NetConfig, level| {
         let fusion = FusionConfig::new(config, level).init(&device);

@@ -16,10 +16,16 @@ use super::segments::Segments;
 #[cfg(not(target_family = "wasm"))]
 use burn::backend::Autodiff;
 
+// The engine for the browser does not train: there, half of this has no caller.
+#[cfg_attr(target_family = "wasm", allow(dead_code))]
 mod block;
+#[cfg_attr(target_family = "wasm", allow(dead_code))]
 mod flex;
+#[cfg_attr(target_family = "wasm", allow(dead_code))]
 mod layer;
+#[cfg_attr(target_family = "wasm", allow(dead_code))]
 mod linear;
+#[cfg_attr(target_family = "wasm", allow(dead_code))]
 mod norm;
 
 /// Widths of the operation.
