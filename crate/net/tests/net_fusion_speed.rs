@@ -98,15 +98,20 @@ fn whole() {
         println!(
             "{thousands}k voxels, {views} views, {c} channels: forward ms, backward ms, GFLOP/s"
         );
-        let times = timed(&[planes.clone(), planes], |t| {
-            let plane = Plane {
-                base: t[0].clone().reshape(shape),
-                hidden: Some(t[1].clone().reshape(shape)),
-                confidence: None,
-            };
-            fusion.forward(&plane, &on, Pooling::Softmax).features
+        let plane = |t: &[Tensor<2>]| Plane {
+            base: t[0].clone().reshape(shape),
+            hidden: Some(t[1].clone().reshape(shape)),
+            confidence: None,
+        };
+        let inputs = [planes.clone(), planes];
+        let times = timed(&inputs, |t| {
+            fusion.forward(&plane(&t), &on, Pooling::Softmax).features
         });
         report("whole", flop, pairs.len(), times);
+        let depth = on.z_m.clone().unsqueeze_dim(1);
+        // What the whole would take without the operation that keeps blocks of pairs in the cache.
+        let times = timed(&inputs, |t| fusion.tokens(&plane(&t), &on, depth.clone()));
+        report("in tensors", flop, pairs.len(), times);
     }
 }
 
