@@ -195,9 +195,16 @@ pub async fn run(engine: Rc<Engine>, options: RunOptions) {
             let text = error.to_string();
             let (message, advice) = text.split_once("; ").unwrap_or((&text, ""));
             let code = match error {
-                RunError::Volume(VolumeError::TooManyBricks { .. }) => "memory",
+                RunError::Volume(VolumeError::TooManyBricks { .. }) | RunError::TooLarge { .. } => {
+                    "memory"
+                }
                 RunError::Volume(_) | RunError::Stereo(StereoError::Device(_)) => "device",
-                RunError::Stereo(_) | RunError::NothingFused { .. } => "scan",
+                RunError::NoWeights => "weights",
+                RunError::Stereo(_)
+                | RunError::NothingFused { .. }
+                | RunError::TooFewPictures { .. }
+                | RunError::NoOverlap { .. }
+                | RunError::NothingOccupied { .. } => "scan",
             };
             engine.fail(code, message.to_owned(), advice.to_owned());
         }

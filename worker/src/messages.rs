@@ -242,7 +242,7 @@ pub enum Event {
     },
     /// Work cannot go on.
     Failed {
-        /// One of a few words for programs: `noWebgpu`, `scan`, `memory`, `device`, `internal`, `export`.
+        /// One of a few words for programs: `noWebgpu`, `scan`, `memory`, `device`, `weights`, `internal`, `export`.
         code: String,
         /// One plain sentence.
         message: String,
