@@ -62,7 +62,7 @@ impl Sensor {
         let worse = |r: &mut Random, most: f32| most * bad * bad * r.range(0.3, 1.0);
         Self {
             target: r.range(0.13, 0.27),
-            automatic: r.unit(),
+            automatic: r.range(0.3, 1.0),
             drift: [r.range(0.0, 0.35), r.range(0.0, 0.06)],
             white: Vec3::new(r.range(-0.08, 0.08), 0.0, r.range(-0.1, 0.08)),
             neutral: r.range(0.5, 1.0),

@@ -37,7 +37,7 @@ pub(crate) fn furnish(b: &mut Builder, plan: &Plan, index: usize, mood: Mood) ->
     } else {
         4.0 + area * b.random.range(0.4, 0.9) * (0.4 + mood.full)
     };
-    let limit = 0.28 + 0.27 * mood.full;
+    let limit = 0.28 + 0.32 * mood.full;
     let kinds = wishes(usage);
     // What makes the room what it is comes first.
     let first = kinds.first().map(|kind| kind.0);
@@ -79,7 +79,7 @@ pub(crate) fn furnish(b: &mut Builder, plan: &Plan, index: usize, mood: Mood) ->
             fixtures::rug(b, &at, size);
         }
     }
-    let strewn = (area * b.random.range(0.0, 0.5) * mood.full) as u32;
+    let strewn = (area * b.random.range(0.0, 0.7) * mood.full) as u32;
     for _ in 0..strewn {
         let turn = b.random.range(0.0, TAU);
         if let Some(at) = site.on_floor(&mut b.random, [0.45, 0.45], turn, 0.05) {

@@ -25,7 +25,7 @@ pub(crate) const FAR_M: f32 = 100.0;
 const SMALL_M: f32 = 0.03;
 /// Light weaker than this share of what else there is, is left out.
 const FAINT: f32 = 0.01;
-/// Light on what a bounced ray finds counts up to this many times the ambient light there.
+/// What a bounced ray brings counts up to this many times the ambient light.
 const BRIGHTEST: f32 = 4.0;
 /// What the ambient light counts beside a ray's.
 const GUESS: f32 = 1e-3;
@@ -157,10 +157,11 @@ pub(crate) fn arriving(room: &TrainingRoom, point: &Point, probe: &Probe) -> Arr
             let other = &room.scene.solids[hit.solid as usize].look;
             let tone = other.tones[0].lerp(other.tones[1], 0.5);
             let there = origin + dir * hit.t + hit.normal * AWAY_M;
-            let ambient = room.ambient_at(there);
-            // The bright spot beside a lamp would show as blocks: one ray finds it and its neighbours do not.
-            let most = Vec3::splat(BRIGHTEST * ambient.max_element());
-            tone * (strongest(room, there, hit.normal).min(most) + ambient)
+            let back = room.ambient_at(there);
+            let given = tone * (strongest(room, there, hit.normal) + back);
+            // One bright spot beside a lamp or behind a door would show as blocks: one ray finds it and those of the
+            // pixels around do not.
+            given.min(Vec3::splat(BRIGHTEST * ambient.max_element()))
         }
         None => ambient,
     };

@@ -295,8 +295,8 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
         if other.solid != NONE {
             let there = origin + way * other.t + other.normal * AWAY_M;
             let back = ambient_at(there);
-            let lit = min(strongest(there, other.normal), vec3f(BRIGHTEST * largest(back)));
-            around = solids[other.solid].tone.xyz * (lit + back);
+            let given = solids[other.solid].tone.xyz * (strongest(there, other.normal) + back);
+            around = min(given, vec3f(BRIGHTEST * largest(ambient)));
         }
     }
     result[slot] = bitcast<u32>(hit.t);

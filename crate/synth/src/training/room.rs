@@ -59,7 +59,7 @@ impl TrainingRoom {
             .iter()
             .fold(Vec3::splat(1e-3), |a, b| a.max(*b));
         for ambient in &mut room.ambient {
-            *ambient = ambient.max(0.12 * brightest);
+            *ambient = ambient.max(0.2 * brightest);
         }
         room
     }
@@ -163,7 +163,8 @@ fn weather(r: &mut Random) -> (Daylight, Mood) {
     } else {
         0.0
     };
-    let full = r.unit();
+    // Lived-in rooms are the usual ones.
+    let full = r.unit().sqrt();
     let day = Daylight { level, tint };
     (
         day,

@@ -103,7 +103,7 @@ impl<'a> Site<'a> {
     /// A place at a wall for something of `size` (along the wall, away from it, high), with `clear` metres before it.
     pub fn at_wall(&mut self, r: &mut Random, size: [f32; 3], clear: f32) -> Option<Place> {
         let total: f32 = self.walls.iter().map(|wall| wall.length).sum();
-        for _ in 0..14 {
+        for _ in 0..28 {
             let mut left = r.range(0.0, total);
             let index = self.walls.iter().position(|wall| {
                 left -= wall.length;
@@ -143,7 +143,7 @@ impl<'a> Site<'a> {
         clear: f32,
     ) -> Option<Place> {
         let bounds = self.space.bounds();
-        for _ in 0..14 {
+        for _ in 0..28 {
             let p = bounds.low + bounds.size() * Vec2::new(r.unit(), r.unit());
             let place = Place {
                 origin: p.extend(0.0),
