@@ -6,17 +6,21 @@ use serde_json::Value;
 use super::{devices::values, relative_error};
 
 /// A golden file of digests by name.
-pub struct Digests(Value);
+pub struct Digests {
+    file: Value,
+    tolerance: f32,
+}
 
 impl Digests {
     /// Of a file's text.
-    pub fn read(text: &str) -> Self {
-        Self(serde_json::from_str(text).unwrap())
+    pub fn read(text: &str, tolerance: f32) -> Self {
+        let file = serde_json::from_str(text).unwrap();
+        Self { file, tolerance }
     }
 
-    /// Shape, every k-th number and the sum of all must be the reference's within 1e-4 of the largest.
+    /// Shape, every k-th number and the sum of all must be the reference's within the tolerance, as a share of the largest.
     pub async fn assert<const D: usize>(&self, name: &str, found: Tensor<D>) {
-        let expected = &self.0[name];
+        let expected = &self.file[name];
         assert!(expected.is_object(), "the reference has no {name}");
         let numbers = |key: &str| -> Vec<f32> {
             let array = expected[key].as_array().unwrap();
@@ -28,10 +32,10 @@ impl Digests {
         let every = expected["every"].as_u64().unwrap() as usize;
         let some: Vec<f32> = found.iter().step_by(every).copied().collect();
         let off = relative_error(&some, &numbers("values"));
-        assert!(off < 1e-4, "{name}: {off:e}");
+        assert!(off < self.tolerance, "{name}: {off:e}");
         let sum: f64 = found.iter().map(|v| f64::from(*v)).sum();
         let number = |key: &str| expected[key].as_f64().unwrap();
         let off = (sum - number("sum")).abs() / number("magnitude");
-        assert!(off < 1e-4, "sum of {name}: {off:e}");
+        assert!(off < f64::from(self.tolerance), "sum of {name}: {off:e}");
     }
 }
