@@ -7,15 +7,14 @@ mod common;
 
 use burn::{
     Tensor,
-    module::{Module, ModuleVisitor, Param},
-    tensor::{Device, Gradients, TensorData},
+    tensor::{Device, TensorData},
 };
 use common::{devices::values, filled, numbers};
 use glam::{IVec3, ivec3};
 use net::{
     NetConfig,
     decode::{
-        Decoder, DecoderConfig, UNetMaps, halved,
+        DecoderConfig, UNetMaps, halved,
         maps::{pooling, submanifold},
         unet::Residual,
     },
@@ -147,13 +146,6 @@ on_each_device! {
     }
 }
 
-#[cfg(not(target_family = "wasm"))]
-on_each_device! {
-    async fn networks_in_training_are_the_reference_s(device: Device) {
-        assert_networks(device.autodiff(), "batch").await;
-    }
-}
-
 on_each_device! {
     async fn no_sites_give_no_rows(device: Device) {
         let decoder = CONFIG.init(&device);
@@ -189,51 +181,64 @@ fn parameters_are_the_method_s() {
     }
 }
 
-/// The gradients of a decoder's parameters, in their order.
+/// What autodiff does; the engine for the browser is built without.
 #[cfg(not(target_family = "wasm"))]
-struct Collected<'a>(&'a Gradients, Vec<Vec<f32>>);
+mod trained {
+    use super::*;
+    use burn::{
+        module::{Module, ModuleVisitor, Param},
+        tensor::Gradients,
+    };
+    use net::decode::Decoder;
 
-#[cfg(not(target_family = "wasm"))]
-impl ModuleVisitor for Collected<'_> {
-    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        if param.val().is_require_grad() {
-            let gradient = param.val().grad(self.0).expect("a gradient");
-            self.1.push(pollster::block_on(values(gradient)));
+    on_each_device! {
+        async fn networks_in_training_are_the_reference_s(device: Device) {
+            assert_networks(device.autodiff(), "batch").await;
         }
     }
-}
 
-#[cfg(not(target_family = "wasm"))]
-fn gradients(device: Device) -> Vec<Vec<f32>> {
-    let device = device.autodiff();
-    let decoder: Decoder = filled(CONFIG.init(&device));
-    let maps = UNetMaps::new(&sites(), &device);
-    // Features with which no ReLU is nearer than 8e-5 to its kink: there rounding would decide.
-    let features = made("given", [sites().len(), CONFIG.inputs], 1.0, &device);
-    let (features, logit) = decoder.forward(features, &maps);
-    let gradients = (features.powi_scalar(2).sum() + logit.powi_scalar(2).sum()).backward();
-    let mut collected = Collected(&gradients, Vec::new());
-    decoder.visit(&mut collected);
-    let learned = |(path, _): &&(String, TensorData)| !path.contains("running");
-    let expected = net::named::tensors(&decoder).iter().filter(learned).count();
-    assert_eq!(collected.1.len(), expected);
-    collected.1
-}
+    /// The gradients of a decoder's parameters, in their order.
+    struct Collected<'a>(&'a Gradients, Vec<Vec<f32>>);
 
-#[cfg(not(target_family = "wasm"))]
-#[test]
-fn every_parameter_has_a_gradient_alike_on_both_devices() {
-    let flex = gradients(Device::flex());
-    for gradient in &flex {
-        let sum: f32 = gradient.iter().map(|v| v.abs()).sum();
-        assert!(sum > 0.0 && sum.is_finite());
+    impl ModuleVisitor for Collected<'_> {
+        fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+            if param.val().is_require_grad() {
+                let gradient = param.val().grad(self.0).expect("a gradient");
+                self.1.push(pollster::block_on(values(gradient)));
+            }
+        }
     }
-    let Some(gpu) = common::devices::gpu() else {
-        println!("skipped: no Vulkan, Metal or DirectX adapter on this machine");
-        return;
-    };
-    for (gpu, flex) in gradients(gpu).iter().zip(&flex) {
-        let off = common::relative_error(gpu, flex);
-        assert!(off < 1e-4, "{off:e}");
+
+    fn gradients(device: Device) -> Vec<Vec<f32>> {
+        let device = device.autodiff();
+        let decoder: Decoder = filled(CONFIG.init(&device));
+        let maps = UNetMaps::new(&sites(), &device);
+        // Features with which no ReLU is nearer than 8e-5 to its kink: there rounding would decide.
+        let features = made("given", [sites().len(), CONFIG.inputs], 1.0, &device);
+        let (features, logit) = decoder.forward(features, &maps);
+        let gradients = (features.powi_scalar(2).sum() + logit.powi_scalar(2).sum()).backward();
+        let mut collected = Collected(&gradients, Vec::new());
+        decoder.visit(&mut collected);
+        let learned = |(path, _): &&(String, TensorData)| !path.contains("running");
+        let expected = net::named::tensors(&decoder).iter().filter(learned).count();
+        assert_eq!(collected.1.len(), expected);
+        collected.1
+    }
+
+    #[test]
+    fn every_parameter_has_a_gradient_alike_on_both_devices() {
+        let flex = gradients(Device::flex());
+        for gradient in &flex {
+            let sum: f32 = gradient.iter().map(|v| v.abs()).sum();
+            assert!(sum > 0.0 && sum.is_finite());
+        }
+        let Some(gpu) = common::devices::gpu() else {
+            println!("skipped: no Vulkan, Metal or DirectX adapter on this machine");
+            return;
+        };
+        for (gpu, flex) in gradients(gpu).iter().zip(&flex) {
+            let off = common::relative_error(gpu, flex);
+            assert!(off < 1e-4, "{off:e}");
+        }
     }
 }
