@@ -134,7 +134,12 @@ on_each_device! {
         let sites = sites([17, 12, 10]);
         for (name, map, taps) in maps(&sites, &device) {
             let gather = rows(&map.gather).await;
-            for (inputs, outputs) in [(1, 1), (5, 3), (8, 16), (19, 37), (32, 32), (33, 65), (16, 128)] {
+            // A new shape costs a GPU a compilation, and its form is the same for all.
+            let shapes = match device == Device::flex() {
+                true => vec![(1, 1), (5, 3), (8, 16), (19, 37), (32, 32), (33, 65), (16, 128)],
+                false => vec![(5, 3)],
+            };
+            for (inputs, outputs) in shapes {
                 let x = numbers("x", map.inputs * inputs, 1.0);
                 let w = numbers("w", taps * inputs * outputs, 1.0);
                 let expected = by_definition(&x, &w, [taps, inputs, outputs], &gather);
