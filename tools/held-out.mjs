@@ -22,7 +22,8 @@ const { values } = parseArgs({
     ipdrecon: { type: 'string', default: join(import.meta.dirname, '..', 'target', 'release', 'ipdrecon') },
   },
 });
-if (!values.scans) throw new Error('expected --scans with a folder of scans, found none');
+const folder = values.scans;
+if (!folder) throw new Error('expected --scans with a folder of scans, found none');
 
 const work = mkdtempSync(join(tmpdir(), 'held-out-'));
 const ipdrecon = (...args) => execFileSync(values.ipdrecon, args, { encoding: 'utf8', stdio: ['ignore', 'pipe', 'pipe'] });
@@ -52,9 +53,10 @@ if (values.stereo) {
 // What TransformerFusion's protocol gives a scene without a mesh.
 const nothing = { accuracy_m: 1, completeness_m: 1, precision: 1, recall: 0, f_score: 0 };
 const columns = Object.keys(nothing);
+/** @type {{ name: string, scans: Record<string, number>[], empty: number }[]} */
 const rows = methods.map(([name]) => ({ name, scans: [], empty: 0 }));
 try {
-  const scans = readdirSync(values.scans).sort().map((name) => join(values.scans, name));
+  const scans = readdirSync(folder).sort().map((name) => join(folder, name));
   for (const scan of scans) {
     const truth = join(work, 'truth.ply');
     ipdrecon('fuse', scan, '--max-depth', values.reach, '-o', truth);
