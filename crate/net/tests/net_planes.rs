@@ -5,7 +5,6 @@
 #[macro_use]
 mod common;
 
-use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 use common::devices::values;
 use common::filled;
@@ -17,7 +16,7 @@ use net::planes::confidence::ConfidenceEncoding;
 use net::planes::decoding::SpatialDecoding;
 use net::planes::pyramid::Pyramid;
 use net::planes::rays::{RayEncoding, encoded};
-use net::planes::{DEVIATION, MEAN, Plane, PlaneNet, PlanesError, check_size, plane_size};
+use net::planes::{DEVIATION, MEAN, PlaneNet, PlanesError, check_size, plane_size};
 use net::{Level, NetConfig, View};
 use serde_json::Value;
 
@@ -307,22 +306,22 @@ fn planes_have_the_size_that_is_promised() {
 }
 
 #[cfg(not(target_family = "wasm"))]
-fn loss(planes: [Plane; 3]) -> Tensor<1> {
-    planes
-        .into_iter()
-        .flat_map(|plane| [Some(plane.base), plane.hidden, plane.confidence])
-        .flatten()
-        .map(|t| t.square().mean())
-        .reduce(|a, b| a + b)
-        .unwrap()
-}
-
-#[cfg(not(target_family = "wasm"))]
 mod trained {
-    use burn::module::{ModuleVisitor, Param};
+    use burn::module::{Module, ModuleVisitor, Param};
     use burn::tensor::Gradients;
+    use net::planes::Plane;
 
     use super::*;
+
+    fn loss(planes: [Plane; 3]) -> Tensor<1> {
+        planes
+            .into_iter()
+            .flat_map(|plane| [Some(plane.base), plane.hidden, plane.confidence])
+            .flatten()
+            .map(|t| t.square().mean())
+            .reduce(|a, b| a + b)
+            .unwrap()
+    }
 
     /// The gradient of every parameter, by path.
     struct Collected<'a> {
