@@ -280,6 +280,8 @@ def golden():
     inputs = [made("sixteenth", 2, 20, 4, 5), made("eighth", 2, 12, 7, 9), made("quarter", 2, 10, 14, 18)]
     for name, y in zip(["coarse", "medium", "fine"], pyramid(Weights(), *inputs)):
         found[f"pyramid.{name}"] = y
+    a, x = made("factors", 1, 2, 3, 161) / 2 + 0.5, made("inputs", 1, 2, 3, 161)
+    found["linrec.forward"], found["linrec.backward"] = linrec(a, x, False), linrec(a, x, True)
     features = made("features", 2, 20, 9, 13)
     found["rays.encoded"] = encoded_rays(9, 13, 8)
     found["rays.features"] = rays(Weights(), features, 8)

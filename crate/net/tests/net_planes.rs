@@ -10,6 +10,7 @@ use common::devices::values;
 use common::filled;
 use glam::{Affine3A, EulerRot, Quat, Vec3};
 use mesh::camera::Pinhole;
+use net::ops::linrec::linrec;
 use net::planes::affine::AffineCompensation;
 use net::planes::backbone::Backbone;
 use net::planes::confidence::ConfidenceEncoding;
@@ -105,6 +106,17 @@ impl Golden {
         let number = |key: &str| expected[key].as_f64().unwrap();
         let off = (sum - number("sum")).abs() / number("magnitude");
         assert!(off < 1e-4, "sum of {name}: {off:e}");
+    }
+}
+
+on_each_device! {
+    async fn recurrence_is_the_reference_s(device: Device) {
+        let golden = Golden::read();
+        let shape = [1, 2, 3, 161];
+        let a = || made("factors", shape, &device) / 2.0 + 0.5;
+        let x = || made("inputs", shape, &device);
+        golden.assert("linrec.forward", linrec(a(), x(), false)).await;
+        golden.assert("linrec.backward", linrec(a(), x(), true)).await;
     }
 }
 
