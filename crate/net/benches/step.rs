@@ -80,7 +80,7 @@ fn main() {
             pooling: Pooling::Softmax,
             most_sites: [1 << 13, 1 << 14],
             seed: 1,
-            teacher: true,
+            at_least_true: true,
         };
         let mut model = Ipdrecon::new(&config, &device);
         let mut optimizer = AdamConfig::new().init();

@@ -21,8 +21,9 @@ pub struct LossOptions {
     pub most_sites: [usize; 2],
     /// Which random one.
     pub seed: u64,
-    /// Go down where the truth is occupied too, not only where the network says so: training, as opposed to validation.
-    pub teacher: bool,
+    /// Go down at no fewer sites than are truly occupied, the likeliest ones: training, as opposed to use. Of the truth only
+    /// their number counts: sites that it chose would tell the level below where the surface is by being there.
+    pub at_least_true: bool,
 }
 
 /// The loss of a sample, and how right the network was.
@@ -129,12 +130,15 @@ pub fn loss(
             &known.rows,
             device,
         ));
-        let said = positive(&decoded.logit);
+        let logits: Vec<f32> = decoded.logit.clone().detach().into_data().iter().collect();
+        let said: Vec<bool> = logits.iter().map(|logit| *logit > 0.0).collect();
         occupancy[l] = known.confusion(&said);
-        let keep: Vec<i32> = (0..sites.len())
-            .filter(|&i| said[i] || options.teacher && known.true_at[i])
-            .map(|i| i as i32)
-            .collect();
+        let least = if options.at_least_true {
+            known.count()
+        } else {
+            0
+        };
+        let keep = likeliest(&logits, &said, least);
         let parents: Vec<IVec3> = keep.iter().map(|&i| sites[i as usize]).collect();
         let all = children(&parents);
         let chosen = nearest_to_one(&all, options.most_sites[l], options.seed ^ l as u64);
@@ -247,6 +251,11 @@ impl Known {
         known
     }
 
+    /// How many sites are known to be occupied.
+    fn count(&self) -> usize {
+        self.true_at.iter().filter(|occupied| **occupied).count()
+    }
+
     fn confusion(&self, said: &[bool]) -> Confusion {
         let mut confusion = Confusion::default();
         for (row, &said) in said.iter().enumerate() {
@@ -261,9 +270,24 @@ impl Known {
     }
 }
 
-fn positive(logit: &Tensor<1>) -> Vec<bool> {
-    let data = logit.clone().detach().into_data();
-    data.iter::<f32>().map(|v| v > 0.0).collect()
+/// Rows of the sites that are said to be occupied; where they are fewer than `least`, of the `least` likeliest. In order.
+fn likeliest(logits: &[f32], said: &[bool], least: usize) -> Vec<i32> {
+    let found: Vec<i32> = (0..said.len() as i32)
+        .filter(|&i| said[i as usize])
+        .collect();
+    let least = least.min(logits.len());
+    if found.len() >= least {
+        return found;
+    }
+    let mut order: Vec<i32> = (0..logits.len() as i32).collect();
+    let unlikely = |&i: &i32, &j: &i32| {
+        let likelier = logits[j as usize].total_cmp(&logits[i as usize]);
+        likelier.then(i.cmp(&j))
+    };
+    order.select_nth_unstable_by(least - 1, unlikely);
+    order.truncate(least);
+    order.sort_unstable();
+    order
 }
 
 fn guide_of(

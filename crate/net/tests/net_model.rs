@@ -82,7 +82,7 @@ fn options() -> LossOptions {
         pooling: Pooling::Softmax,
         most_sites: [1 << 14, 1 << 16],
         seed: 1,
-        teacher: true,
+        at_least_true: true,
     }
 }
 

@@ -53,7 +53,7 @@ impl Task for Network {
             // Alone, every medium voxel is needed to count what was missed.
             most_sites: [if taught { most_medium } else { usize::MAX }, most_fine],
             seed: moment.seed,
-            teacher: taught,
+            at_least_true: taught,
         };
         let size = self.size.map(|side| side as usize);
         let found = loss(model, sample, size, &options, device);

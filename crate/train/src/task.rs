@@ -20,8 +20,8 @@ pub struct Moment {
 /// Which voxels of a level are divided into those of the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Descent {
-    /// Those that are occupied or that the network believes to be, up to a number: to learn. Losses of two networks can be
-    /// compared, since a level is never spared for want of voxels.
+    /// Those that the network believes most to be occupied, as many as truly are at the least and up to a number: to learn.
+    /// Losses of two networks can be compared, since a level is never spared for want of voxels.
     Taught,
     /// Those that the network believes to be occupied, as in use: to be judged.
     Alone,
