@@ -21,6 +21,7 @@ async function native(bench) {
 
 const fusion = await native('fusion');
 const stereo = await native('stereo');
+const step = await native('step');
 // By its address: the type check of the tools does not follow into the tests.
 const browser = await (await import(new URL('../tests/browser/bench.mjs', import.meta.url).href)).table();
 const text = `# Benchmarks
@@ -45,6 +46,12 @@ same threads; CPU seconds are those of all threads. GFLOP/s and GB/s count what 
 (\`crate/stereo/src/fused/work.rs\`). Equal mean ZNCC says that all did the same work.
 
 ${stereo}
+
+## A training step on the processor
+
+One crop of 2.56 x 2.56 x 1.92 m with eight pictures of 160x128, all of which see nearly all of it; best of three steps.
+
+${step}
 
 ## Fusion on the page: WebGPU against the CPU device (one thread), with pictures drawn meanwhile
 
