@@ -18,7 +18,7 @@ impl Level {
     pub const ALL: [Self; 3] = [Self::Coarse, Self::Medium, Self::Fine];
 
     /// Edge of a voxel in metres.
-    pub fn voxel_size_m(self) -> f32 {
+    pub const fn voxel_size_m(self) -> f32 {
         [0.16, 0.08, 0.04][self as usize]
     }
 

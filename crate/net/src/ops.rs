@@ -21,10 +21,30 @@ pub mod views;
 pub(crate) mod wide;
 
 use burn::backend::DispatchDevice;
+#[cfg(not(target_family = "wasm"))]
+use burn::backend::{
+    Backend,
+    autodiff::{NodeId, grads::Gradients},
+    tensor::FloatTensor,
+};
 use burn::tensor::Device;
 
 /// Whether `device` computes in flex's loops, with or without differentiation.
 pub(crate) fn on_processor(device: &Device) -> bool {
     let plain = device.clone().without_autodiff();
     matches!(plain.as_dispatch(), DispatchDevice::Flex(_))
+}
+
+/// Hands an operation's gradients on to those of its inputs that want theirs.
+#[cfg(not(target_family = "wasm"))]
+pub(crate) fn hand_on<B: Backend, const N: usize>(
+    grads: &mut Gradients,
+    inputs: [Option<NodeId>; N],
+    found: [FloatTensor<B>; N],
+) {
+    for (input, found) in inputs.into_iter().zip(found) {
+        if let Some(input) = input {
+            grads.register::<B>(input, found);
+        }
+    }
 }

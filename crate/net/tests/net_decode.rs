@@ -9,7 +9,7 @@ use burn::{
     Tensor,
     tensor::{Device, TensorData},
 };
-use common::{devices::values, filled, numbers};
+use common::{devices::values, digests::Digests, filled, numbers};
 use glam::{IVec3, ivec3};
 use net::{
     NetConfig,
@@ -20,7 +20,6 @@ use net::{
     },
     ops::sparse_conv::{KernelMap, sparse_conv},
 };
-use serde_json::Value;
 
 const CONFIG: DecoderConfig = DecoderConfig { inputs: 5, base: 3 };
 
@@ -48,60 +47,27 @@ fn features(device: &Device) -> Tensor<2> {
     made("features", [sites().len(), CONFIG.inputs], 1.0, device)
 }
 
-/// The reference's numbers.
-struct Golden(Value);
+fn golden() -> Digests {
+    let text = include_str!("../../../tests/golden/net_decode.json");
+    Digests::read(text, 1e-4)
+}
 
-impl Golden {
-    fn read() -> Self {
-        let text = include_str!("../../../tests/golden/net_decode.json");
-        Self(serde_json::from_str(text).unwrap())
-    }
-
-    /// Shape, every k-th number and the sum of all must be the reference's.
-    fn assert(&self, name: &str, dims: &[usize], found: &[f32]) {
-        let expected = &self.0[name];
-        assert!(expected.is_object(), "the reference has no {name}");
-        let numbers = |key: &str| -> Vec<f32> {
-            let array = expected[key].as_array().unwrap();
-            array.iter().map(|v| v.as_f64().unwrap() as f32).collect()
-        };
-        let shape: Vec<f32> = dims.iter().map(|&d| d as f32).collect();
-        assert_eq!(shape, numbers("shape"), "{name}");
-        let every = expected["every"].as_u64().unwrap() as usize;
-        let some: Vec<f32> = found.iter().step_by(every).copied().collect();
-        let off = common::relative_error(&some, &numbers("values"));
-        assert!(off < 1e-4, "{name}: {off:e}");
-        let sum: f64 = found.iter().map(|v| f64::from(*v)).sum();
-        let number = |key: &str| expected[key].as_f64().unwrap();
-        let off = (sum - number("sum")).abs() / number("magnitude");
-        assert!(off < 1e-4, "sum of {name}: {off:e}");
-    }
-
-    async fn assert_tensor<const D: usize>(&self, name: &str, found: Tensor<D>) {
-        let dims = found.dims();
-        self.assert(name, &dims, &values(found).await);
-    }
-
-    fn assert_sites(&self, name: &str, found: &[IVec3]) {
-        let flat: Vec<f32> = found
-            .iter()
-            .flat_map(|s| s.to_array())
-            .map(|c| c as f32)
-            .collect();
-        self.assert(name, &[found.len(), 3], &flat);
-    }
+fn assert_sites(golden: &Digests, name: &str, found: &[IVec3]) {
+    let flat = found.iter().flat_map(|site| site.to_array());
+    let flat: Vec<f32> = flat.map(|place| place as f32).collect();
+    golden.assert_numbers(name, &[found.len(), 3], &flat);
 }
 
 #[cfg_attr(target_family = "wasm", wasm_bindgen_test::wasm_bindgen_test)]
 #[cfg_attr(not(target_family = "wasm"), test)]
 fn sites_are_the_reference_s() {
-    Golden::read().assert_sites("sites", &sites());
-    Golden::read().assert_sites("halved", &halved(&sites()));
+    assert_sites(&golden(), "sites", &sites());
+    assert_sites(&golden(), "halved", &halved(&sites()));
 }
 
 on_each_device! {
     async fn convolutions_are_the_reference_s(device: Device) {
-        let golden = Golden::read();
+        let golden = golden();
         let sites = sites();
         let halves = halved(&sites);
         let conv = |name, features, map: &KernelMap, taps: usize| {
@@ -110,34 +76,32 @@ on_each_device! {
             sparse_conv(features, made(name, [taps, 5, 4], scale, &device), map)
         };
         let same = submanifold(&sites, &device);
-        golden.assert_tensor("same", conv("same", features(&device), &same, 27)).await;
+        golden.assert("same", conv("same", features(&device), &same, 27)).await;
         let down = pooling(&sites, &halves, &device);
-        golden.assert_tensor("down", conv("down", features(&device), &down, 8)).await;
+        golden.assert("down", conv("down", features(&device), &down, 8)).await;
         let halves = made("halves", [halves.len(), 5], 1.0, &device);
-        golden.assert_tensor("up", conv("up", halves, &down.transposed(), 8)).await;
+        golden.assert("up", conv("up", halves, &down.transposed(), 8)).await;
     }
 }
 
 /// Blocks and the whole on a device, whose batch normalisation takes the statistics `named`.
 async fn assert_networks(device: Device, named: &str) {
-    let golden = Golden::read();
+    let golden = golden();
     let maps = UNetMaps::new(&sites(), &device);
     let residual = |outputs| {
         let block = filled(Residual::new(CONFIG.inputs, outputs, &device));
         block.forward(features(&device), &maps.same[0])
     };
     golden
-        .assert_tensor(&format!("residual.wider.{named}"), residual(7))
+        .assert(&format!("residual.wider.{named}"), residual(7))
         .await;
     golden
-        .assert_tensor(&format!("residual.same.{named}"), residual(5))
+        .assert(&format!("residual.same.{named}"), residual(5))
         .await;
     let decoder = filled(CONFIG.init(&device));
     let (features, logit) = decoder.forward(features(&device), &maps);
-    golden
-        .assert_tensor(&format!("features.{named}"), features)
-        .await;
-    golden.assert_tensor(&format!("logit.{named}"), logit).await;
+    golden.assert(&format!("features.{named}"), features).await;
+    golden.assert(&format!("logit.{named}"), logit).await;
 }
 
 on_each_device! {

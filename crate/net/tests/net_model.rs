@@ -7,7 +7,7 @@ mod common;
 
 use burn::module::Module;
 use burn::tensor::Device;
-use burn::tensor::DeviceKind;
+use common::tiny;
 use glam::{Affine3A, IVec3, Mat3, Vec3};
 use mesh::camera::Pinhole;
 use net::fusion::Pooling;
@@ -17,16 +17,6 @@ use net::{Ipdrecon, NetConfig, Sample, View, named};
 
 const WIDTH: usize = 64;
 const HEIGHT: usize = 48;
-
-fn tiny() -> NetConfig {
-    NetConfig {
-        backbone: [8, 8, 8, 8, 16],
-        pyramid: 16,
-        planes: [16, 8, 8],
-        unet: [4, 4, 4],
-        ..NetConfig::full()
-    }
-}
 
 /// Three cameras that look along x at a wall at x = 1.1 m, in a crop of 1.28 x 1.28 x 0.64 m.
 fn sample() -> Sample {
@@ -135,8 +125,8 @@ fn parameters_are_those_of_the_paper_and_of_vortx() {
     }
 }
 
-/// Sites of the crop, all levels' logits one after the other.
-fn logits(model: &Ipdrecon, sample: &Sample, device: &Device) -> Vec<f32> {
+/// Fused features and view occupancy at some sites of all levels, one after the other.
+fn fused(model: &Ipdrecon, sample: &Sample, device: &Device) -> Vec<f32> {
     let shape = [sample.views.len(), 3, HEIGHT, WIDTH];
     let images = burn::tensor::TensorData::new(sample.images.clone(), shape);
     let planes = model.planes(
@@ -178,15 +168,15 @@ fn fresh_weights_of_the_full_network_are_the_baseline() {
         Some(data.iter::<f32>().collect())
     });
     let (ours, theirs) = (
-        logits(&full, &sample, &device),
-        logits(&baseline, &sample, &device),
+        fused(&full, &sample, &device),
+        fused(&baseline, &sample, &device),
     );
     let error = common::relative_error(&ours, &theirs);
     assert!(error < 1e-5, "{error}");
     // Not because nothing depends on anything.
     assert!(theirs.iter().any(|v| v.abs() > 0.1));
     let trained = common::filled(full);
-    assert!(common::relative_error(&logits(&trained, &sample, &device), &theirs) > 0.1);
+    assert!(common::relative_error(&fused(&trained, &sample, &device), &theirs) > 0.1);
 }
 
 fn weights(model: &Ipdrecon) -> Vec<f32> {
@@ -199,13 +189,8 @@ fn weights(model: &Ipdrecon) -> Vec<f32> {
 
 #[test]
 fn a_loss_step_is_the_same_on_both_devices() {
-    let gpu = std::panic::catch_unwind(|| {
-        let device = Device::wgpu(DeviceKind::DefaultDevice);
-        burn::tensor::Tensor::<1>::ones([1], &device).into_data();
-        device
-    });
-    let Ok(gpu) = gpu else {
-        println!("SKIPPED: no wgpu adapter here");
+    let Some(gpu) = common::devices::gpu() else {
+        println!("skipped: no Vulkan, Metal or DirectX adapter on this machine");
         return;
     };
     let sample = sample();

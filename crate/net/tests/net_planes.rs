@@ -7,6 +7,7 @@ mod common;
 
 use burn::tensor::{Device, Tensor, TensorData};
 use common::devices::values;
+use common::digests::Digests;
 use common::filled;
 use glam::{Affine3A, EulerRot, Quat, Vec3};
 use mesh::camera::Pinhole;
@@ -19,7 +20,6 @@ use net::planes::pyramid::Pyramid;
 use net::planes::rays::{RayEncoding, encoded};
 use net::planes::{DEVIATION, MEAN, PlaneNet, PlanesError, check_size, plane_size};
 use net::{Level, NetConfig, View};
-use serde_json::Value;
 
 // Sides that halve to odd numbers on the way.
 const WIDTH: usize = 72;
@@ -72,46 +72,14 @@ fn images(device: &Device) -> Tensor<4> {
     tensor(values.iter().map(|v| v + 127.5).collect(), shape, device)
 }
 
-/// The reference's numbers.
-struct Golden(Value);
-
-impl Golden {
-    fn read() -> Self {
-        let text = include_str!("../../../tests/golden/net_planes.json");
-        Self(serde_json::from_str(text).unwrap())
-    }
-
-    /// Shape, every k-th number and the sum of all must be the reference's.
-    async fn assert(&self, name: &str, found: Tensor<4>) {
-        let expected = &self.0[name];
-        assert!(expected.is_object(), "the reference has no {name}");
-        let numbers = |key: &str| -> Vec<f64> {
-            let array = expected[key].as_array().unwrap();
-            array.iter().map(|v| v.as_f64().unwrap()).collect()
-        };
-        let shape: Vec<f64> = found.dims().iter().map(|&d| d as f64).collect();
-        assert_eq!(shape, numbers("shape"), "{name}");
-        let found = values(found).await;
-        let every = expected["every"].as_u64().unwrap() as usize;
-        let some: Vec<f32> = found.iter().step_by(every).copied().collect();
-        let off = common::relative_error(
-            &some,
-            &numbers("values")
-                .iter()
-                .map(|v| *v as f32)
-                .collect::<Vec<_>>(),
-        );
-        assert!(off < 1e-4, "{name}: {off:e}");
-        let sum: f64 = found.iter().map(|v| f64::from(*v)).sum();
-        let number = |key: &str| expected[key].as_f64().unwrap();
-        let off = (sum - number("sum")).abs() / number("magnitude");
-        assert!(off < 1e-4, "sum of {name}: {off:e}");
-    }
+fn golden() -> Digests {
+    let text = include_str!("../../../tests/golden/net_planes.json");
+    Digests::read(text, 1e-4)
 }
 
 on_each_device! {
     async fn recurrence_is_the_reference_s(device: Device) {
-        let golden = Golden::read();
+        let golden = golden();
         let shape = [1, 2, 3, 161];
         let a = || made("factors", shape, &device) / 2.0 + 0.5;
         let x = || made("inputs", shape, &device);
@@ -122,7 +90,7 @@ on_each_device! {
 
 on_each_device! {
     async fn backbone_is_the_reference_s(device: Device) {
-        let golden = Golden::read();
+        let golden = golden();
         let of_channels = |values: [f32; 3]| tensor(values.to_vec(), [1, 3, 1, 1], &device);
         let images = (images(&device) - of_channels(MEAN)) / of_channels(DEVIATION);
         let backbone = filled(Backbone::init(config().backbone, &device));
@@ -135,7 +103,7 @@ on_each_device! {
 
 on_each_device! {
     async fn pyramid_is_the_reference_s(device: Device) {
-        let golden = Golden::read();
+        let golden = golden();
         let pyramid = filled(Pyramid::init(&config(), &device));
         let [coarse, medium, fine] = pyramid.forward([
             made("sixteenth", [2, 20, 4, 5], &device),
@@ -150,7 +118,7 @@ on_each_device! {
 
 on_each_device! {
     async fn each_part_of_a_level_is_the_reference_s(device: Device) {
-        let golden = Golden::read();
+        let golden = golden();
         let features = made("features", [2, 20, 9, 13], &device);
 
         let directions = tensor(encoded(&views(), 13, 9, 8), [2, 27, 9, 13], &device);
@@ -200,7 +168,7 @@ const LEVELS: [&str; 3] = ["coarse", "medium", "fine"];
 
 on_each_device! {
     async fn the_whole_is_the_reference_s_for_all_settings(device: Device) {
-        let golden = Golden::read();
+        let golden = golden();
         for (setting, config) in settings() {
             let net = filled(PlaneNet::init(&config, &device));
             let planes = net.forward(images(&device), &views());

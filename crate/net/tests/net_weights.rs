@@ -6,18 +6,9 @@
 mod common;
 
 use burn::tensor::Device;
+use common::tiny;
 use net::weights::{Precision, WeightsError, config, load, save};
 use net::{Ipdrecon, NetConfig, named};
-
-fn tiny() -> NetConfig {
-    NetConfig {
-        backbone: [8, 8, 8, 8, 16],
-        pyramid: 16,
-        planes: [16, 8, 8],
-        unet: [4, 4, 4],
-        ..NetConfig::full()
-    }
-}
 
 fn model(config: &NetConfig) -> Ipdrecon {
     common::filled(Ipdrecon::new(config, &Device::flex()))

@@ -33,7 +33,10 @@ pub fn affine_sample(planes: Tensor<4>, maps: Tensor<2>) -> Tensor<4> {
 pub trait AffineSampling: Backend {
     /// See [`affine_sample`].
     fn affine_sample(planes: FloatTensor<Self>, maps: FloatTensor<Self>) -> FloatTensor<Self>;
+}
 
+/// The way back, which a backend needs to be differentiated.
+pub trait AffineSamplingGradient: AffineSampling {
     /// Gradients of `planes` and `maps` from the output's.
     fn affine_sample_backward(
         planes: FloatTensor<Self>,
@@ -46,7 +49,9 @@ impl AffineSampling for Flex {
     fn affine_sample(planes: FlexTensor, maps: FlexTensor) -> FlexTensor {
         flex::forward(planes, maps)
     }
+}
 
+impl AffineSamplingGradient for Flex {
     fn affine_sample_backward(
         planes: FlexTensor,
         maps: FlexTensor,

@@ -6,7 +6,7 @@
 //! probabilities again from the logarithm of their sum (FlashAttention, Dao et al. 2022): memory is that of the inputs.
 
 use burn::backend::{
-    Backend, Flex, TensorMetadata, backend_extension,
+    Backend, TensorMetadata, backend_extension,
     tensor::{FloatTensor, IntTensor},
 };
 use burn::tensor::Tensor;
@@ -91,27 +91,7 @@ pub trait AttentionPasses: Backend {
 
 impl AttentionPasses for CubeBackend {}
 
-impl AttentionExtension for CubeBackend {
-    fn segment_attention(
-        query: FloatTensor<Self>,
-        key: FloatTensor<Self>,
-        value: FloatTensor<Self>,
-        offsets: IntTensor<Self>,
-        of_row: IntTensor<Self>,
-        longest: usize,
-        heads: usize,
-    ) -> FloatTensor<Self> {
-        let shared = Shared {
-            offsets,
-            of_row,
-            longest,
-            heads,
-        };
-        Self::attention_forward([query, key, value], &shared).0
-    }
-}
-
-impl AttentionExtension for Flex {
+impl<B: AttentionPasses> AttentionExtension for B {
     fn segment_attention(
         query: FloatTensor<Self>,
         key: FloatTensor<Self>,
@@ -139,6 +119,7 @@ mod trained {
         ops::{Backward, Ops, OpsKind},
     };
 
+    use super::super::hand_on;
     use super::*;
 
     #[derive(Debug)]
@@ -161,11 +142,8 @@ mod trained {
             let grad = grads.consume::<B>(&ops.node);
             let (inputs, out, log_sum, shared) = ops.state;
             let found = B::attention_backward(inputs, out, log_sum, grad, &shared);
-            for (parent, grad) in ops.parents.into_iter().zip(found) {
-                if let Some(node) = parent {
-                    grads.register::<B>(node.id, grad);
-                }
-            }
+            let parents = ops.parents.map(|parent| parent.map(|parent| parent.id));
+            hand_on::<B, _>(grads, parents, found);
         }
     }
 

@@ -43,7 +43,10 @@ pub trait ChannelNormalisation: Backend {
         gamma: FloatTensor<Self>,
         beta: FloatTensor<Self>,
     ) -> FloatTensor<Self>;
+}
 
+/// The way back, which a backend needs to be differentiated.
+pub trait ChannelNormalisationGradient: ChannelNormalisation {
     /// Gradients of `x`, `gamma` and `beta` from the output's.
     fn channel_norm_backward(
         x: FloatTensor<Self>,
@@ -152,7 +155,9 @@ impl ChannelNormalisation for Flex {
             });
         flex::tensor(out, shape)
     }
+}
 
+impl ChannelNormalisationGradient for Flex {
     fn channel_norm_backward(
         x: FlexTensor,
         gamma: FlexTensor,
@@ -204,12 +209,13 @@ mod backward {
     use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
     use burn::backend::tensor::FloatTensor;
 
-    use super::ChannelNormalisation;
+    use super::{ChannelNormalisation, ChannelNormalisationGradient};
+    use crate::ops::hand_on;
 
     #[derive(Debug)]
     struct Normalised;
 
-    impl<B: ChannelNormalisation> Backward<B, 3> for Normalised {
+    impl<B: ChannelNormalisationGradient> Backward<B, 3> for Normalised {
         type State = [FloatTensor<B>; 2];
 
         fn backward(
@@ -221,15 +227,14 @@ mod backward {
             let grad = grads.consume::<B>(&ops.node);
             let [x, gamma] = ops.state;
             let found = B::channel_norm_backward(x, gamma, grad);
-            for (node, found) in ops.parents.into_iter().zip([found.0, found.1, found.2]) {
-                if let Some(node) = node {
-                    grads.register::<B>(node.id, found);
-                }
-            }
+            let inputs = ops.parents.map(|parent| parent.map(|parent| parent.id));
+            hand_on::<B, _>(grads, inputs, [found.0, found.1, found.2]);
         }
     }
 
-    impl<B: ChannelNormalisation, C: CheckpointStrategy> ChannelNormalisation for Autodiff<B, C> {
+    impl<B: ChannelNormalisationGradient, C: CheckpointStrategy> ChannelNormalisation
+        for Autodiff<B, C>
+    {
         fn channel_norm(
             x: FloatTensor<Self>,
             gamma: FloatTensor<Self>,
@@ -244,14 +249,6 @@ mod backward {
                 }
                 OpsKind::UnTracked(prepared) => prepared.finish(B::channel_norm(x, gamma, beta)),
             }
-        }
-
-        fn channel_norm_backward(
-            _x: FloatTensor<Self>,
-            _gamma: FloatTensor<Self>,
-            _grad: FloatTensor<Self>,
-        ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>) {
-            unimplemented!("second derivatives of layer normalisation")
         }
     }
 }

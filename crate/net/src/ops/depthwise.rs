@@ -303,6 +303,7 @@ mod backward {
     use burn::backend::tensor::FloatTensor;
 
     use super::Depthwise;
+    use crate::ops::hand_on;
 
     #[derive(Debug)]
     struct DepthwiseBackward;
@@ -316,16 +317,11 @@ mod backward {
             grads: &mut Gradients,
             _checkpointer: &mut Checkpointer,
         ) {
-            let [of_x, of_weight] = ops.parents;
             let grad = grads.consume::<B>(&ops.node);
             let (x, weight, stride) = ops.state;
-            let (x, weight) = B::depthwise_backward(x, weight, grad, stride);
-            if let Some(node) = of_x {
-                grads.register::<B>(node.id, x);
-            }
-            if let Some(node) = of_weight {
-                grads.register::<B>(node.id, weight);
-            }
+            let (of_x, of_weight) = B::depthwise_backward(x, weight, grad, stride);
+            let inputs = ops.parents.map(|parent| parent.map(|parent| parent.id));
+            hand_on::<B, _>(grads, inputs, [of_x, of_weight]);
         }
     }
 

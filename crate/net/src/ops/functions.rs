@@ -1,4 +1,4 @@
-//! Exponentials without branches, which loops over slices turn into wide instructions. Within 2 units of the last place.
+//! Exponentials and logarithm without branches, which loops over slices turn into wide instructions. Within 2 units of the last place.
 
 /// `2^n` and `e^r - 1` of `x = n ln 2 + r`, for -87 <= x <= 88.
 #[inline(always)]
@@ -62,6 +62,33 @@ pub(crate) fn sigmoid(x: f32) -> f32 {
     high / (1.0 + t)
 }
 
+/// `ln x` within two units in the last place, for a normal number above 0. After Cephes: a polynomial for the mantissa in
+/// `sqrt(1 / 2)..sqrt(2)`.
+#[inline(always)]
+pub(crate) fn ln(x: f32) -> f32 {
+    const LN2_HIGH: f32 = 0.693_359_4;
+    const LN2_LOW: f32 = -2.121_944_4e-4;
+    // A mantissa above sqrt(2) counts as half of itself with the next exponent.
+    let bits = x
+        .to_bits()
+        .wrapping_sub(std::f32::consts::FRAC_1_SQRT_2.to_bits());
+    let exponent = (bits as i32 >> 23) as f32;
+    let mantissa = (bits & 0x007f_ffff).wrapping_add(std::f32::consts::FRAC_1_SQRT_2.to_bits());
+    let r = f32::from_bits(mantissa) - 1.0;
+    let p = 7.037_683_6e-2;
+    let p = p * r - 1.151_461e-1;
+    let p = p * r + 1.167_699_9e-1;
+    let p = p * r - 1.242_014_1e-1;
+    let p = p * r + 1.424_932_3e-1;
+    let p = p * r - 1.666_805_8e-1;
+    let p = p * r + 2.000_071_5e-1;
+    let p = p * r - 2.499_999_4e-1;
+    let p = p * r + 3.333_333e-1;
+    let square = r * r;
+    let rest = p * r * square + exponent * LN2_LOW - 0.5 * square;
+    (r + rest) + exponent * LN2_HIGH
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -90,9 +117,32 @@ mod tests {
     }
 
     #[test]
+    fn beyond_what_a_number_holds_it_stays_at_the_edge() {
+        assert!(exp(f32::NEG_INFINITY) < 2e-38);
+        assert!(exp(f32::INFINITY) > 1e38);
+        assert_eq!(exp(0.0), 1.0);
+    }
+
+    #[test]
     fn not_a_number_stays_none() {
         assert!(exp(f32::NAN).is_nan());
         assert!(softplus(f32::NAN).0.is_nan());
         assert!(sigmoid(f32::NAN).is_nan());
+    }
+
+    #[test]
+    fn logarithm_is_exact_to_two_units() {
+        for i in -120..120 {
+            for j in 0..100 {
+                let x = 2.0_f32.powi(i) * (1.0 + 0.01 * j as f32);
+                let exact = f64::from(x).ln();
+                let error = (f64::from(ln(x)) - exact).abs();
+                assert!(
+                    error <= 2.4e-7 * exact.abs(),
+                    "ln {x}: {} is not {exact}",
+                    ln(x)
+                );
+            }
+        }
     }
 }

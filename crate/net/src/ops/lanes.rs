@@ -83,91 +83,9 @@ pub(crate) fn add_scaled(to: &mut [f32], by: f32, from: &[f32]) {
     each(to, [&from[..to.len()]], |to, [from]| to + by * from);
 }
 
-/// `e^x` within two units in the last place for `x` in -80..88, and no less and no more than there: as good as nothing, and
-/// without branches. After Cephes: `2^n e^r` with a polynomial for `r` in `-ln 2 / 2..ln 2 / 2`.
-#[inline(always)]
-pub(crate) fn exp(x: f32) -> f32 {
-    // Adding this rounds to a whole number and leaves it in the lowest bits.
-    const ROUND: f32 = 12_582_912.0;
-    const LN2_HIGH: f32 = 0.693_359_4;
-    const LN2_LOW: f32 = -2.121_944_4e-4;
-    let x = if x > 88.0 { 88.0 } else { x };
-    let x = if x < -80.0 { -80.0 } else { x };
-    let shifted = x * std::f32::consts::LOG2_E + ROUND;
-    let whole = shifted - ROUND;
-    let r = (x - whole * LN2_HIGH) - whole * LN2_LOW;
-    let p = 1.987_569_1e-4;
-    let p = p * r + 1.398_2e-3;
-    let p = p * r + 8.333_452e-3;
-    let p = p * r + 4.166_579_6e-2;
-    let p = p * r + 1.666_666_5e-1;
-    let p = p * r + 0.5;
-    let fraction = (p * r) * r + r + 1.0;
-    let exponent = shifted.to_bits().wrapping_sub(ROUND.to_bits());
-    let scale = f32::from_bits(exponent.wrapping_add(127) << 23);
-    fraction * scale
-}
-
-/// `ln x` within two units in the last place, for a normal number above 0. After Cephes: a polynomial for the mantissa in
-/// `sqrt(1 / 2)..sqrt(2)`.
-#[inline(always)]
-pub(crate) fn ln(x: f32) -> f32 {
-    const LN2_HIGH: f32 = 0.693_359_4;
-    const LN2_LOW: f32 = -2.121_944_4e-4;
-    // A mantissa above sqrt(2) counts as half of itself with the next exponent.
-    let bits = x
-        .to_bits()
-        .wrapping_sub(std::f32::consts::FRAC_1_SQRT_2.to_bits());
-    let exponent = (bits as i32 >> 23) as f32;
-    let mantissa = (bits & 0x007f_ffff).wrapping_add(std::f32::consts::FRAC_1_SQRT_2.to_bits());
-    let r = f32::from_bits(mantissa) - 1.0;
-    let p = 7.037_683_6e-2;
-    let p = p * r - 1.151_461e-1;
-    let p = p * r + 1.167_699_9e-1;
-    let p = p * r - 1.242_014_1e-1;
-    let p = p * r + 1.424_932_3e-1;
-    let p = p * r - 1.666_805_8e-1;
-    let p = p * r + 2.000_071_5e-1;
-    let p = p * r - 2.499_999_4e-1;
-    let p = p * r + 3.333_333e-1;
-    let square = r * r;
-    let rest = p * r * square + exponent * LN2_LOW - 0.5 * square;
-    (r + rest) + exponent * LN2_HIGH
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn exponential_is_exact_to_two_units() {
-        for i in -8000..=8800 {
-            let x = i as f32 * 0.01;
-            let exact = f64::from(x).exp();
-            let error = (f64::from(exp(x)) - exact).abs() / exact;
-            assert!(error < 2.4e-7, "e^{x}: relative error {error}");
-        }
-        assert!(exp(f32::NEG_INFINITY) < 2e-35);
-        assert!(exp(f32::INFINITY) > 1e38);
-        assert_eq!(exp(0.0), 1.0);
-        assert!(exp(f32::NAN).is_nan());
-    }
-
-    #[test]
-    fn logarithm_is_exact_to_two_units() {
-        for i in -120..120 {
-            for j in 0..100 {
-                let x = 2.0_f32.powi(i) * (1.0 + 0.01 * j as f32);
-                let exact = f64::from(x).ln();
-                let error = (f64::from(ln(x)) - exact).abs();
-                assert!(
-                    error <= 2.4e-7 * exact.abs(),
-                    "ln {x}: {} is not {exact}",
-                    ln(x)
-                );
-            }
-        }
-    }
 
     #[test]
     fn sums_take_every_element_once() {

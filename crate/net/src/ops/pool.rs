@@ -3,7 +3,7 @@
 //! `out_n = sum_i w_i t_i` over the rows `i` of segment `n`. A segment without rows gives zeros.
 
 use burn::backend::{
-    Backend, Flex, TensorMetadata, backend_extension,
+    Backend, TensorMetadata, backend_extension,
     tensor::{FloatTensor, IntTensor},
 };
 use burn::tensor::Tensor;
@@ -99,26 +99,7 @@ pub trait PoolPasses: Backend {
 
 impl PoolPasses for CubeBackend {}
 
-impl PoolExtension for CubeBackend {
-    fn segment_pool(
-        tokens: FloatTensor<Self>,
-        logits: FloatTensor<Self>,
-        offsets: IntTensor<Self>,
-        of_row: IntTensor<Self>,
-        longest: usize,
-        pooling: Pooling,
-    ) -> FloatTensor<Self> {
-        let shared = Shared {
-            offsets,
-            of_row,
-            longest,
-            pooling,
-        };
-        Self::pool_forward(tokens, logits, &shared).0
-    }
-}
-
-impl PoolExtension for Flex {
+impl<B: PoolPasses> PoolExtension for B {
     fn segment_pool(
         tokens: FloatTensor<Self>,
         logits: FloatTensor<Self>,
@@ -145,6 +126,7 @@ mod trained {
         ops::{Backward, Ops, OpsKind},
     };
 
+    use super::super::hand_on;
     use super::*;
 
     #[derive(Debug)]
@@ -162,11 +144,8 @@ mod trained {
             let grad = grads.consume::<B>(&ops.node);
             let ([tokens, weights, out], shared) = ops.state;
             let found = B::pool_backward(tokens, weights, out, grad, &shared);
-            for (parent, grad) in ops.parents.into_iter().zip(found) {
-                if let Some(node) = parent {
-                    grads.register::<B>(node.id, grad);
-                }
-            }
+            let inputs = ops.parents.map(|parent| parent.map(|parent| parent.id));
+            hand_on::<B, _>(grads, inputs, found);
         }
     }
 

@@ -5,7 +5,7 @@
 //! pixels are rows of `C` channels. Coordinates have no gradient.
 
 use burn::backend::{
-    Backend, Flex, TensorMetadata, backend_extension, get_device_settings,
+    Backend, TensorMetadata, backend_extension, get_device_settings,
     tensor::{FloatTensor, IntTensor},
 };
 use burn::tensor::{IndexingUpdateOp, Int, Tensor};
@@ -88,25 +88,7 @@ pub trait RowsPasses: Backend {
 
 impl RowsPasses for CubeBackend {}
 
-impl RowsExtension for CubeBackend {
-    fn sample_rows(
-        table: FloatTensor<Self>,
-        corner: IntTensor<Self>,
-        right: FloatTensor<Self>,
-        down: FloatTensor<Self>,
-        plane: [usize; 2],
-    ) -> FloatTensor<Self> {
-        let at = At {
-            corner,
-            right,
-            down,
-            plane,
-        };
-        Self::rows_forward(table, &at)
-    }
-}
-
-impl RowsExtension for Flex {
+impl<B: RowsPasses> RowsExtension for B {
     fn sample_rows(
         table: FloatTensor<Self>,
         corner: IntTensor<Self>,

@@ -71,7 +71,10 @@ pub trait SelectiveScan: Backend {
         log_rate: FloatTensor<Self>,
         pass: Pass,
     ) -> FloatTensor<Self>;
+}
 
+/// The way back, which a backend needs to be differentiated.
+pub trait SelectiveScanGradient: SelectiveScan {
     /// Gradients of `x`, `step` and `log_rate` from the output's.
     fn selective_scan_backward(
         x: FloatTensor<Self>,
@@ -91,7 +94,9 @@ impl SelectiveScan for Flex {
     ) -> FlexTensor {
         flex::forward(x, step, log_rate, pass)
     }
+}
 
+impl SelectiveScanGradient for Flex {
     fn selective_scan_backward(
         x: FlexTensor,
         step: FlexTensor,

@@ -23,7 +23,10 @@ pub fn silu<const D: usize>(x: Tensor<D>) -> Tensor<D> {
 pub trait Silu: Backend {
     /// See [`silu`].
     fn silu(x: FloatTensor<Self>) -> FloatTensor<Self>;
+}
 
+/// The way back, which a backend needs to be differentiated.
+pub trait SiluGradient: Silu {
     /// Gradient of `x` from the output's.
     fn silu_backward(x: FloatTensor<Self>, grad: FloatTensor<Self>) -> FloatTensor<Self>;
 }
@@ -58,7 +61,9 @@ impl Silu for Flex {
             .for_each(|(y, x)| of_run(x, y));
         flex::tensor(y, shape)
     }
+}
 
+impl SiluGradient for Flex {
     fn silu_backward(x: FlexTensor, grad: FlexTensor) -> FlexTensor {
         let shape = x.shape();
         let (x, grad) = (flex::read(x), flex::read(grad));
@@ -79,12 +84,12 @@ mod backward {
     use burn::backend::autodiff::ops::{Backward, Ops, OpsKind, unary};
     use burn::backend::tensor::FloatTensor;
 
-    use super::Silu;
+    use super::{Silu, SiluGradient};
 
     #[derive(Debug)]
     struct Slope;
 
-    impl<B: Silu> Backward<B, 1> for Slope {
+    impl<B: SiluGradient> Backward<B, 1> for Slope {
         type State = FloatTensor<B>;
 
         fn backward(
@@ -100,7 +105,7 @@ mod backward {
         }
     }
 
-    impl<B: Silu, C: CheckpointStrategy> Silu for Autodiff<B, C> {
+    impl<B: SiluGradient, C: CheckpointStrategy> Silu for Autodiff<B, C> {
         fn silu(x: FloatTensor<Self>) -> FloatTensor<Self> {
             let prepared = Slope.prepare::<C>([x.node()]);
             let x = x.into_primitive();
@@ -111,10 +116,6 @@ mod backward {
                 }
                 OpsKind::UnTracked(prepared) => prepared.finish(B::silu(x)),
             }
-        }
-
-        fn silu_backward(_x: FloatTensor<Self>, _grad: FloatTensor<Self>) -> FloatTensor<Self> {
-            unimplemented!("second derivatives of the SiLU")
         }
     }
 }

@@ -49,7 +49,10 @@ fn doubled(x: Tensor<4>, axis: usize) -> Tensor<4> {
 pub trait Upsampling: Backend {
     /// See [`upsample2`].
     fn upsample2(x: FloatTensor<Self>) -> FloatTensor<Self>;
+}
 
+/// The way back, which a backend needs to be differentiated.
+pub trait UpsamplingGradient: Upsampling {
     /// Gradient of `x` from the output's.
     fn upsample2_backward(grad: FloatTensor<Self>) -> FloatTensor<Self>;
 }
@@ -117,7 +120,9 @@ impl Upsampling for Flex {
             );
         flex::tensor(out, [views, channels, 2 * height, wide].into())
     }
+}
 
+impl UpsamplingGradient for Flex {
     fn upsample2_backward(grad: FlexTensor) -> FlexTensor {
         let [views, channels, height, width] = grad.shape().dims();
         let grad = flex::read(grad);
@@ -153,12 +158,12 @@ mod backward {
     use burn::backend::autodiff::ops::{Backward, Ops, OpsKind, unary};
     use burn::backend::tensor::FloatTensor;
 
-    use super::Upsampling;
+    use super::{Upsampling, UpsamplingGradient};
 
     #[derive(Debug)]
     struct Upsampled;
 
-    impl<B: Upsampling> Backward<B, 1> for Upsampled {
+    impl<B: UpsamplingGradient> Backward<B, 1> for Upsampled {
         type State = ();
 
         fn backward(
@@ -171,7 +176,7 @@ mod backward {
         }
     }
 
-    impl<B: Upsampling, C: CheckpointStrategy> Upsampling for Autodiff<B, C> {
+    impl<B: UpsamplingGradient, C: CheckpointStrategy> Upsampling for Autodiff<B, C> {
         fn upsample2(x: FloatTensor<Self>) -> FloatTensor<Self> {
             let prepared = Upsampled.prepare::<C>([x.node()]);
             let y = B::upsample2(x.into_primitive());
@@ -179,10 +184,6 @@ mod backward {
                 OpsKind::Tracked(prepared) => prepared.finish((), y),
                 OpsKind::UnTracked(prepared) => prepared.finish(y),
             }
-        }
-
-        fn upsample2_backward(_grad: FloatTensor<Self>) -> FloatTensor<Self> {
-            unimplemented!("second derivatives of upsampling")
         }
     }
 }

@@ -53,3 +53,14 @@ pub fn relative_error(found: &[f32], expected: &[f32]) -> f32 {
     let off = off.fold(0.0_f32, |m, d| if d <= m { m } else { d });
     off / largest.max(1e-12)
 }
+
+/// A network with all of its parts that is quick to run.
+pub fn tiny() -> net::NetConfig {
+    net::NetConfig {
+        backbone: [8, 8, 8, 8, 16],
+        pyramid: 16,
+        planes: [16, 8, 8],
+        unet: [4, 4, 4],
+        ..net::NetConfig::full()
+    }
+}

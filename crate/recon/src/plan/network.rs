@@ -5,7 +5,7 @@ use net::planes;
 use scan::{Camera, Frame};
 
 /// Voxels of the network's finest level, in metres.
-pub(super) const VOXEL_M: f32 = 0.04;
+pub(super) const VOXEL_M: f32 = net::Level::Fine.voxel_size_m();
 
 /// Which of the keyframes that see a tile are used, when there are more than [`NetworkConfig::views_a_tile`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -6,12 +6,13 @@ use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
 
-use super::AffineSampling;
+use super::{AffineSampling, AffineSamplingGradient};
+use crate::ops::hand_on;
 
 #[derive(Debug)]
 struct Sampled;
 
-impl<B: AffineSampling> Backward<B, 2> for Sampled {
+impl<B: AffineSamplingGradient> Backward<B, 2> for Sampled {
     type State = [FloatTensor<B>; 2];
 
     fn backward(
@@ -23,15 +24,12 @@ impl<B: AffineSampling> Backward<B, 2> for Sampled {
         let grad = grads.consume::<B>(&ops.node);
         let [planes, maps] = ops.state;
         let (of_planes, of_maps) = B::affine_sample_backward(planes, maps, grad);
-        for (node, found) in ops.parents.into_iter().zip([of_planes, of_maps]) {
-            if let Some(node) = node {
-                grads.register::<B>(node.id, found);
-            }
-        }
+        let inputs = ops.parents.map(|parent| parent.map(|parent| parent.id));
+        hand_on::<B, _>(grads, inputs, [of_planes, of_maps]);
     }
 }
 
-impl<B: AffineSampling, C: CheckpointStrategy> AffineSampling for Autodiff<B, C> {
+impl<B: AffineSamplingGradient, C: CheckpointStrategy> AffineSampling for Autodiff<B, C> {
     fn affine_sample(planes: FloatTensor<Self>, maps: FloatTensor<Self>) -> FloatTensor<Self> {
         let prepared = Sampled.prepare::<C>([planes.node(), maps.node()]);
         let (planes, maps) = (planes.into_primitive(), maps.into_primitive());
@@ -42,13 +40,5 @@ impl<B: AffineSampling, C: CheckpointStrategy> AffineSampling for Autodiff<B, C>
             }
             OpsKind::UnTracked(prepared) => prepared.finish(B::affine_sample(planes, maps)),
         }
-    }
-
-    fn affine_sample_backward(
-        _planes: FloatTensor<Self>,
-        _maps: FloatTensor<Self>,
-        _grad: FloatTensor<Self>,
-    ) -> (FloatTensor<Self>, FloatTensor<Self>) {
-        unimplemented!("second derivatives of affine sampling")
     }
 }

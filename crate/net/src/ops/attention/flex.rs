@@ -5,7 +5,8 @@ use burn::backend::{Flex, tensor::FloatTensor};
 use rayon::prelude::*;
 
 use super::super::flex::{parts, split_rows, tensor};
-use super::super::lanes::{LANES, add_scaled, dot, each, exp, ln, sum};
+use super::super::functions::{exp, ln};
+use super::super::lanes::{LANES, add_scaled, dot, each, sum};
 use super::super::wide::wide;
 use super::{AttentionPasses, Shared};
 

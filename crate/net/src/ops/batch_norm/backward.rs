@@ -7,6 +7,7 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, AutodiffBackend};
 
 use super::BatchNormalisation;
+use crate::ops::hand_on;
 
 #[derive(Debug)]
 struct Normalised;
@@ -24,11 +25,8 @@ impl<B: BatchNormalisation> Backward<B, 3> for Normalised {
         let grad = grads.consume::<B>(&ops.node);
         let ([x, gamma, beta, mean, variance], epsilon, relu) = ops.state;
         let found = B::normalised_backward(x, gamma, beta, mean, variance, grad, epsilon, relu);
-        for (node, found) in ops.parents.into_iter().zip([found.0, found.1, found.2]) {
-            if let Some(node) = node {
-                grads.register::<B>(node.id, found);
-            }
-        }
+        let inputs = ops.parents.map(|parent| parent.map(|parent| parent.id));
+        hand_on::<B, _>(grads, inputs, [found.0, found.1, found.2]);
     }
 }
 

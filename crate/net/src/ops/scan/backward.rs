@@ -6,12 +6,13 @@ use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
 
-use super::{Pass, SelectiveScan};
+use super::{Pass, SelectiveScan, SelectiveScanGradient};
+use crate::ops::hand_on;
 
 #[derive(Debug)]
 struct Scanned;
 
-impl<B: SelectiveScan> Backward<B, 3> for Scanned {
+impl<B: SelectiveScanGradient> Backward<B, 3> for Scanned {
     type State = ([FloatTensor<B>; 3], Pass);
 
     fn backward(
@@ -23,15 +24,12 @@ impl<B: SelectiveScan> Backward<B, 3> for Scanned {
         let grad = grads.consume::<B>(&ops.node);
         let ([x, step, log_rate], pass) = ops.state;
         let found = B::selective_scan_backward(x, step, log_rate, grad, pass);
-        for (node, found) in ops.parents.into_iter().zip([found.0, found.1, found.2]) {
-            if let Some(node) = node {
-                grads.register::<B>(node.id, found);
-            }
-        }
+        let inputs = ops.parents.map(|parent| parent.map(|parent| parent.id));
+        hand_on::<B, _>(grads, inputs, [found.0, found.1, found.2]);
     }
 }
 
-impl<B: SelectiveScan, C: CheckpointStrategy> SelectiveScan for Autodiff<B, C> {
+impl<B: SelectiveScanGradient, C: CheckpointStrategy> SelectiveScan for Autodiff<B, C> {
     fn selective_scan(
         x: FloatTensor<Self>,
         step: FloatTensor<Self>,
@@ -49,15 +47,5 @@ impl<B: SelectiveScan, C: CheckpointStrategy> SelectiveScan for Autodiff<B, C> {
                 prepared.finish(B::selective_scan(x, step, log_rate, pass))
             }
         }
-    }
-
-    fn selective_scan_backward(
-        _x: FloatTensor<Self>,
-        _step: FloatTensor<Self>,
-        _log_rate: FloatTensor<Self>,
-        _grad: FloatTensor<Self>,
-        _pass: Pass,
-    ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>) {
-        unimplemented!("second derivatives of the selective scan")
     }
 }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::super::attention::flex::Scratch;
-use super::super::lanes::exp;
+use super::super::functions::exp;
 use super::super::rows::flex::Slices;
 use super::super::wide::wide;
 use super::ViewsShape;
