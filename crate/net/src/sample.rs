@@ -14,7 +14,7 @@ pub struct Sample {
     pub depth_m: Vec<f32>,
     /// What is true at the lattice points.
     pub truth: Truth,
-    /// Stereo's depth of the same views, for the switch `guide`; empty without.
+    /// Stereo's depth of what of the scan shows the crop, for the switch `guide`; empty without.
     pub guide: Vec<GuideMap>,
 }
 

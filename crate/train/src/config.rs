@@ -40,6 +40,8 @@ pub struct NetChoice {
     pub ipsd: Option<bool>,
     /// Likeness of the views' features.
     pub matching: Option<bool>,
+    /// Stereo's depth, given to the 3D networks.
+    pub guide: Option<bool>,
     /// Widths of the backbone.
     pub backbone: Option<[usize; 5]>,
     /// Channels inside the pyramid.
@@ -72,11 +74,11 @@ impl NetChoice {
             acm: self.acm.unwrap_or(preset.acm),
             ipsd: self.ipsd.unwrap_or(preset.ipsd),
             matching: self.matching.unwrap_or(preset.matching),
+            guide: self.guide.unwrap_or(preset.guide),
             backbone: self.backbone.unwrap_or(preset.backbone),
             pyramid: self.pyramid.unwrap_or(preset.pyramid),
             planes: self.planes.unwrap_or(preset.planes),
             unet: self.unet.unwrap_or(preset.unet),
-            ..preset
         }
     }
 }
@@ -102,7 +104,7 @@ pub struct DataConfig {
     /// Depth beyond this many metres makes no truth.
     #[serde(default = "max_depth_m")]
     pub max_depth_m: f32,
-    /// A folder in which the truth of each scan is kept for the next run.
+    /// A folder in which the truth and stereo's depth of each scan are kept for the next run.
     pub cache: Option<PathBuf>,
     /// Threads that prepare samples.
     #[serde(default = "threads")]

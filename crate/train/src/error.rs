@@ -43,6 +43,14 @@ pub enum TrainError {
         /// What is wrong with it.
         error: scan::FrameError,
     },
+    /// Stereo depth that cannot be made.
+    #[error("{scan}: {error}")]
+    Stereo {
+        /// Of which scan.
+        scan: String,
+        /// What is wrong.
+        error: stereo::StereoError,
+    },
     /// Weights that cannot be read or written.
     #[error("{0}")]
     Weights(String),

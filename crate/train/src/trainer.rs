@@ -350,6 +350,7 @@ fn sample_options(config: &TrainConfig, augment: Augment) -> SampleOptions {
         size: config.data.size,
         crop: config.data.crop,
         least_seen: config.data.least_seen,
+        guide: config.net.config().guide,
         augment,
     }
 }

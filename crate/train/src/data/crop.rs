@@ -1,6 +1,6 @@
 //! A box of a scan in a coordinate system of its own, and the truth in it (methods 1.8 and 1.10).
 
-use super::volume::{SATURATED, TRUNCATION_M, TruthVolume, VOXEL_M};
+use super::volume::{SATURATED, TruthVolume, VOXEL_M};
 use crate::random::Random;
 use glam::{Affine3A, Mat3, Quat, Vec3, Vec3A};
 use net::sample::Truth;
@@ -174,9 +174,4 @@ fn add_unseen_columns(supervised: &mut [bool], [nx, ny, nz]: [usize; 3]) {
             }
         }
     }
-}
-
-/// Distance in metres that a stored value of the truth stands for.
-pub fn metres(tsdf: f32) -> f32 {
-    tsdf * TRUNCATION_M
 }

@@ -26,6 +26,8 @@ pub struct Augment {
     pub mirror: bool,
     /// Change light, colour and sharpness.
     pub photometric: bool,
+    /// Leave out keyframes of stereo's depth: between none and three quarters of them, the share drawn anew each time.
+    pub thin_guide: bool,
     /// Shift cameras by noise of this standard deviation, in metres along each axis.
     pub pose_noise_m: f32,
     /// Turn cameras by noise of this standard deviation, in degrees about each axis.
@@ -38,6 +40,7 @@ impl Default for Augment {
             rotate: true,
             mirror: true,
             photometric: true,
+            thin_guide: true,
             pose_noise_m: 0.0,
             pose_noise_deg: 0.0,
         }
@@ -57,6 +60,8 @@ pub struct SampleOptions {
     pub crop: [usize; 3],
     /// Frames whose picture holds at least this share of the crop's known points are taken first.
     pub least_seen: f32,
+    /// Whether samples come with stereo's depth.
+    pub guide: bool,
     /// What is changed by chance.
     pub augment: Augment,
 }
@@ -90,7 +95,7 @@ impl Sampler {
     /// Sample `number`, the same whenever and wherever it is made.
     ///
     /// # Errors
-    /// When a picture cannot be read, or the scan is smaller than the crop.
+    /// When a picture cannot be read.
     pub fn sample(&mut self, number: u64) -> Result<Sample, TrainError> {
         let index = self.scan_of(number);
         if !self.open.contains_key(&index) {
@@ -100,9 +105,10 @@ impl Sampler {
         let scan = &self.open[&index];
         let volume = self.set.truth(index, scan)?;
         let mut random = Random::new(self.options.seed, number);
-        let crop = self.crop(index, &volume, &mut random)?;
+        let crop = self.crop(&volume, &mut random);
         let truth = crop.truth(&volume);
-        let chosen = self.choose(index, &crop, &truth.tsdf, &mut random);
+        let points = known_points(&crop, &truth.tsdf);
+        let chosen = self.choose(index, &points, &mut random);
         let changes = augment::draw(self.options.size[0], &mut random);
         let mut sample = Sample {
             truth,
@@ -117,57 +123,33 @@ impl Sampler {
                 changes.iter().for_each(|change| change.apply(image, width));
             }
         }
+        if self.options.guide {
+            let maps = self.set.guide(index, scan)?;
+            let thin = self.options.augment.thin_guide;
+            let share = if thin { random.range(0.25, 1.0) } else { 1.0 };
+            sample.guide = maps.of_crop(&crop, &points, share, &mut random);
+        }
         Ok(sample)
     }
 
-    fn crop(
-        &self,
-        index: usize,
-        volume: &TruthVolume,
-        random: &mut Random,
-    ) -> Result<Crop, TrainError> {
+    /// A box around some point near a surface. What of it lies outside of the scan is unseen.
+    fn crop(&self, volume: &TruthVolume, random: &mut Random) -> Crop {
         let SampleOptions { crop, augment, .. } = self.options;
-        let fits = |a: usize, b: usize| crop[0] <= a && crop[1] <= b;
-        let [nx, ny, nz] = volume.size;
-        if crop[2] > nz || !(fits(nx, ny) || fits(ny, nx)) {
-            return Err(TrainError::unfit(
-                &self.set.entries[index].name,
-                format!(
-                    "a scan of at least {} x {} x {} voxels of 4 cm, as data.crop asks",
-                    crop[0], crop[1], crop[2]
-                ),
-                format!("{nx} x {ny} x {nz}"),
-                "make data.crop smaller, or leave the scan out",
-            ));
-        }
         let anchor = volume.near_point_m(random.below(volume.near));
         let chance = CropChance {
             rotate: augment.rotate,
             mirror: augment.mirror,
         };
-        Ok(Crop::draw(crop, anchor.unwrap_or_default(), chance, random))
+        Crop::draw(crop, anchor.unwrap_or_default(), chance, random)
     }
 
-    /// Frames that see enough of every hundredth known point of the crop.
-    fn choose(&self, index: usize, crop: &Crop, tsdf: &[f32], random: &mut Random) -> Vec<usize> {
-        const EVERY: usize = 100;
+    /// Frames that see enough of the points.
+    fn choose(&self, index: usize, points: &[Vec3], random: &mut Random) -> Vec<usize> {
         let entry = &self.set.entries[index];
-        let [nx, ny, _] = crop.size;
-        let known = tsdf
-            .iter()
-            .enumerate()
-            .filter(|(_, value)| **value > -0.999);
-        let world_from_crop = crop.crop_from_world.inverse();
-        let points: Vec<Vec3> = known
-            .step_by(EVERY)
-            .map(|(i, _)| [i % nx, i / nx % ny, i / (nx * ny)])
-            .map(|site| Vec3::from_array(site.map(|n| n as f32)) * VOXEL_M)
-            .map(|point| world_from_crop.transform_point3(point))
-            .collect();
         let see = |frame: usize| {
             let frame = &entry.frames[frame];
             let camera = super::picture::pinhole(&frame.color_camera);
-            let seen = views::seen(&camera, single(&frame.pose), &points);
+            let seen = views::seen(&camera, single(&frame.pose), points);
             Sight::new(seen, points.len(), self.options.least_seen)
         };
         let all = entry.frames.len();
@@ -227,6 +209,23 @@ impl Sampler {
             shift * pose_noise_m,
         )
     }
+}
+
+/// Every hundredth known point of the crop, in the scan's world.
+fn known_points(crop: &Crop, tsdf: &[f32]) -> Vec<Vec3> {
+    const EVERY: usize = 100;
+    let [nx, ny, _] = crop.size;
+    let known = tsdf
+        .iter()
+        .enumerate()
+        .filter(|(_, value)| **value > -0.999);
+    let world_from_crop = crop.crop_from_world.inverse();
+    known
+        .step_by(EVERY)
+        .map(|(i, _)| [i % nx, i / nx % ny, i / (nx * ny)])
+        .map(|site| Vec3::from_array(site.map(|n| n as f32)) * VOXEL_M)
+        .map(|point| world_from_crop.transform_point3(point))
+        .collect()
 }
 
 /// Keeps the order of scans apart from what happens in a sample.

@@ -1,5 +1,6 @@
 //! The scans of a run: their frames in memory, their truth made when first asked for.
 
+use super::guide::StereoMaps;
 use super::picture::pinhole;
 use super::volume::{Building, DepthView, TruthVolume, VOXEL_M};
 use crate::error::TrainError;
@@ -30,6 +31,7 @@ pub struct ScanEntry {
     /// Which of `frames` are keyframes.
     pub keyframes: Vec<usize>,
     truth: Mutex<Option<Arc<TruthVolume>>>,
+    guide: Mutex<Option<Arc<StereoMaps>>>,
 }
 
 /// Scans with depth.
@@ -105,27 +107,16 @@ impl ScanSet {
     /// When a depth image cannot be read, or nothing is near a surface.
     pub fn truth(&self, index: usize, scan: &Scan) -> Result<Arc<TruthVolume>, TrainError> {
         let entry = &self.entries[index];
-        let mut kept = entry.truth.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(volume) = kept.as_ref() {
-            return Ok(volume.clone());
-        }
-        let file = self.cache.as_deref().map(|folder| {
-            let depth_mm = (self.max_depth_m * 1000.0).round();
-            super::volume::cache_file(folder, &entry.name, depth_mm)
-        });
-        let cached = file.as_deref().and_then(TruthVolume::read);
-        let volume = match cached {
-            Some(volume) => volume,
-            None => {
-                let volume = self.fuse(entry, scan)?;
-                if let Some(file) = &file {
-                    volume
-                        .write(file)
-                        .map_err(|error| TrainError::file("write", file, error))?;
-                }
-                volume
-            }
-        };
+        let depth_mm = (self.max_depth_m * 1000.0).round();
+        let file = self.cache_file(entry, &format!("-{depth_mm}mm.tsdf"));
+        let make = || self.fuse(entry, scan);
+        let volume = kept(
+            &entry.truth,
+            file,
+            TruthVolume::read,
+            TruthVolume::write,
+            make,
+        )?;
         if volume.near == 0 {
             return Err(TrainError::unfit(
                 &entry.name,
@@ -134,9 +125,37 @@ impl ScanSet {
                 "raise data.max_depth_m, or leave the scan out",
             ));
         }
-        let volume = Arc::new(volume);
-        *kept = Some(volume.clone());
         Ok(volume)
+    }
+
+    /// Stereo's depth of scan number `index`: made at the first call, kept after.
+    ///
+    /// # Errors
+    /// When stereo cannot read a picture.
+    pub fn guide(&self, index: usize, scan: &Scan) -> Result<Arc<StereoMaps>, TrainError> {
+        let entry = &self.entries[index];
+        let file = self.cache_file(entry, ".stereo");
+        let make = || {
+            let keyframes: Vec<usize> = entry.keyframes.iter().map(|&k| entry.numbers[k]).collect();
+            StereoMaps::make(scan, &keyframes).map_err(|error| TrainError::Stereo {
+                scan: entry.name.clone(),
+                error,
+            })
+        };
+        kept(
+            &entry.guide,
+            file,
+            StereoMaps::read,
+            StereoMaps::write,
+            make,
+        )
+    }
+
+    /// Where something that is made of a scan is kept between runs.
+    fn cache_file(&self, entry: &ScanEntry, ending: &str) -> Option<PathBuf> {
+        let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
+        let name: String = entry.name.chars().map(plain).collect();
+        Some(self.cache.as_deref()?.join(name + ending))
     }
 
     fn fuse(&self, entry: &ScanEntry, scan: &Scan) -> Result<TruthVolume, TrainError> {
@@ -202,6 +221,33 @@ impl ScanSet {
     }
 }
 
+/// What `place` holds; if that is nothing yet, what the file holds; else what `make` gives, which is written to both.
+fn kept<T>(
+    place: &Mutex<Option<Arc<T>>>,
+    file: Option<PathBuf>,
+    read: impl Fn(&Path) -> Option<T>,
+    write: impl Fn(&T, &Path) -> std::io::Result<()>,
+    make: impl FnOnce() -> Result<T, TrainError>,
+) -> Result<Arc<T>, TrainError> {
+    let mut place = place.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(found) = place.as_ref() {
+        return Ok(found.clone());
+    }
+    let found = match file.as_deref().and_then(read) {
+        Some(found) => found,
+        None => {
+            let made = make()?;
+            if let Some(file) = &file {
+                write(&made, file).map_err(|error| TrainError::file("write", file, error))?;
+            }
+            made
+        }
+    };
+    let found = Arc::new(found);
+    *place = Some(found.clone());
+    Ok(found)
+}
+
 /// The camera's place and every eighth measured point of every eighth row, in the world.
 fn corners(view: &DepthView) -> Vec<Vec3> {
     const APART: usize = 8;
@@ -251,6 +297,7 @@ fn entry(name: &str, scan: &Scan, views: usize) -> Result<ScanEntry, TrainError>
         frames,
         numbers,
         truth: Mutex::new(None),
+        guide: Mutex::new(None),
     })
 }
 

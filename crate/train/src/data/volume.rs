@@ -3,13 +3,12 @@
 
 use glam::{Affine3A, IVec3, Vec3};
 use mesh::camera::Pinhole;
+use net::loss::TRUNCATION_M;
 use rayon::prelude::*;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Edge of a voxel, in metres.
-pub const VOXEL_M: f32 = 0.04;
-/// Truncation distance, in metres: three voxels.
-pub const TRUNCATION_M: f32 = 0.12;
+pub const VOXEL_M: f32 = net::Level::Fine.voxel_size_m();
 /// The stored number of a value of 1, which is free space, and negated of -1, which is behind or unobserved.
 pub const SATURATED: i8 = i8::MAX;
 
@@ -201,13 +200,6 @@ impl Row {
     }
 }
 
-/// Where the truth of the scan `name` is kept in `folder`.
-pub fn cache_file(folder: &Path, name: &str, max_depth_mm: f32) -> PathBuf {
-    let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
-    let name: String = name.chars().map(plain).collect();
-    folder.join(format!("{name}-{max_depth_mm}mm.tsdf"))
-}
-
 const MAGIC: [u8; 8] = *b"IPDTSDF1";
 
 impl TruthVolume {
@@ -216,19 +208,13 @@ impl TruthVolume {
     /// # Errors
     /// What the system says.
     pub fn write(&self, file: &Path) -> std::io::Result<()> {
-        if let Some(folder) = file.parent() {
-            std::fs::create_dir_all(folder)?;
-        }
         let mut bytes = MAGIC.to_vec();
         let size = self.size.map(|n| n as i32);
         for number in self.start.to_array().into_iter().chain(size) {
             bytes.extend(number.to_le_bytes());
         }
         bytes.extend(self.values.iter().map(|&value| value as u8));
-        // Under another name until it is whole: a run that is stopped leaves no half of a file behind.
-        let part = file.with_extension("part");
-        std::fs::write(&part, bytes)?;
-        std::fs::rename(part, file)
+        super::write_whole(file, &bytes)
     }
 
     /// Reads what [`TruthVolume::write`] wrote; `None` for anything else, so that it is made anew.

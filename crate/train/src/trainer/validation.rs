@@ -64,6 +64,7 @@ impl Validation {
             rotate: false,
             mirror: false,
             photometric: false,
+            thin_guide: false,
             pose_noise_m: 0.0,
             pose_noise_deg: 0.0,
         };

@@ -52,10 +52,12 @@ pub fn plain(seed: u64) -> SampleOptions {
         size: [160, 112],
         crop: [48, 48, 32],
         least_seen: 0.2,
+        guide: false,
         augment: Augment {
             rotate: false,
             mirror: false,
             photometric: false,
+            thin_guide: false,
             pose_noise_m: 0.0,
             pose_noise_deg: 0.0,
         },
