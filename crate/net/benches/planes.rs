@@ -1,10 +1,7 @@
 //! Where the time of the planes goes on the processor, forward and backward:
-//! `cargo test --release --workspace --test net_planes_speed -- --ignored --nocapture`.
+//! `cargo bench --workspace --bench net_planes`.
 
-#![cfg(not(target_family = "wasm"))]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
-
-mod common;
 
 use std::time::Instant;
 
@@ -47,9 +44,7 @@ fn timed(
     best
 }
 
-#[test]
-#[ignore = "a measurement"]
-fn shares() {
+fn main() {
     let device = Device::flex().autodiff();
     for (name, config) in [("small", NetConfig::small()), ("full", NetConfig::full())] {
         for (width, height) in [(160, 120), (320, 240)] {
@@ -135,35 +130,5 @@ fn shares() {
                 );
             }
         }
-    }
-}
-
-#[test]
-#[ignore = "a measurement"]
-fn whole_only() {
-    let device = Device::flex().autodiff();
-    let net = PlaneNet::init(&NetConfig::small(), &device);
-    let camera = Pinhole {
-        width: 160,
-        height: 120,
-        fx: 160.0,
-        fy: 160.0,
-        cx: 80.0,
-        cy: 60.0,
-    };
-    let views = vec![
-        View {
-            camera,
-            world_from_camera: Affine3A::IDENTITY,
-        };
-        VIEWS
-    ];
-    for _ in 0..20 {
-        let found = timed(&[[VIEWS, 3, 120, 160]], &device, |x| {
-            let planes = net.forward(x.into_iter().next().unwrap(), &views);
-            let parts = planes.map(|p| [Some(p.base), p.hidden, p.confidence]);
-            parts.into_iter().flatten().flatten().collect()
-        });
-        println!("{found:.2?}");
     }
 }

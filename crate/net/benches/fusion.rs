@@ -1,10 +1,7 @@
 //! Where the time of fusion goes on the processor, forward and backward:
-//! `cargo test --release --workspace --test net_fusion_speed -- --ignored --nocapture`.
+//! `cargo bench --workspace --bench net_fusion`.
 
-#![cfg(not(target_family = "wasm"))]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
-
-mod common;
 
 use std::time::Instant;
 
@@ -20,16 +17,15 @@ const PLANE: [usize; 2] = [40, 30];
 /// Voxels that all views see, at places spread over the planes. In the crops of training a third of the views see a voxel.
 fn pairs(voxels: usize, views: usize) -> Pairs {
     let count = voxels * views;
-    let place = |name: &str, size: usize| -> Vec<f32> {
-        let spread = common::numbers(name, count, 0.5);
-        spread
-            .iter()
-            .map(|p| (p + 0.5) * (size - 1) as f32)
+    // The fractions of multiples of an irrational number fill an interval evenly and in no order.
+    let place = |number: f64, size: usize| -> Vec<f32> {
+        (1..=count)
+            .map(|i| ((i as f64 * number).fract() * (size - 1) as f64) as f32)
             .collect()
     };
     Pairs {
-        u: place("u", PLANE[0]),
-        v: place("v", PLANE[1]),
+        u: place(0.754_877_666, PLANE[0]),
+        v: place(0.569_840_291, PLANE[1]),
         z_m: vec![2.0; count],
         view: (0..count).map(|pair| (pair % views) as u32).collect(),
         offsets: (0..=voxels).map(|n| (n * views) as i32).collect(),
@@ -79,8 +75,6 @@ fn report(part: &str, flop: usize, pairs: usize, [f, b]: [f64; 2]) {
     );
 }
 
-#[test]
-#[ignore = "a measurement"]
 fn whole() {
     let device = Device::flex().autodiff();
     for [thousands, views, c] in CASES {
@@ -115,8 +109,6 @@ fn whole() {
     }
 }
 
-#[test]
-#[ignore = "a measurement"]
 fn parts() {
     let device = Device::flex().autodiff();
     for [thousands, views, c] in CASES {
@@ -148,4 +140,9 @@ fn parts() {
         });
         report("pool", 2 * c, rows, times);
     }
+}
+
+fn main() {
+    whole();
+    parts();
 }

@@ -1,7 +1,6 @@
 //! Where the time of the sparse network goes on the processor:
-//! `cargo test --release --workspace --test net_decode_speed -- --ignored --nocapture`.
+//! `cargo bench --workspace --bench net_decode`.
 
-#![cfg(not(target_family = "wasm"))]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use burn::{
@@ -72,8 +71,6 @@ fn gathered(x: Tensor<2>, w: Tensor<3>, map: &KernelMap) -> Tensor<2> {
         .matmul(w.reshape([taps * inputs, outputs]))
 }
 
-#[test]
-#[ignore = "a measurement"]
 fn convolutions() {
     let device = Device::flex();
     let (a, b) = (random([2048, 1024], &device), random([1024, 1024], &device));
@@ -158,8 +155,6 @@ fn convolutions() {
     }
 }
 
-#[test]
-#[ignore = "a measurement"]
 fn networks() {
     for (size, config) in [("small", NetConfig::small()), ("full", NetConfig::full())] {
         let planes = config.planes;
@@ -207,4 +202,9 @@ fn networks() {
             );
         }
     }
+}
+
+fn main() {
+    convolutions();
+    networks();
 }
