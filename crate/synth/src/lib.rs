@@ -11,6 +11,7 @@ mod material;
 mod palette;
 mod path;
 mod picture;
+mod point;
 mod random;
 mod room;
 mod sample;

@@ -8,6 +8,7 @@ use glam::Vec3;
 
 use crate::palette::to_srgb;
 use crate::path::View;
+use crate::point::{Point, soften_edges};
 use crate::room::{Light, Room};
 
 /// One picture of the room.
@@ -21,20 +22,6 @@ pub struct Frame {
     pub color: Vec<[u8; 3]>,
     /// Distance along the optical axis in metres, row by row from the top; exact.
     pub depth_m: Vec<f32>,
-}
-
-/// What the first ray of a pixel found.
-#[derive(Clone, Copy, Default)]
-struct Point {
-    solid: u32,
-    /// Distance along the unit ray.
-    t: f32,
-    at: Vec3,
-    normal: Vec3,
-    /// Linear RGB of the surface.
-    albedo: Vec3,
-    /// Unit direction from the camera.
-    dir: Vec3,
 }
 
 /// Light at a pixel before it is averaged: share of each light seen, and light from everywhere else.
@@ -78,7 +65,14 @@ pub fn render(room: &Room, view: &View) -> Frame {
         .zip(&smooth)
         .map(|(point, light)| shade(room, point, light))
         .collect();
-    soften_edges(room, view, &points, &smooth, &mut linear);
+    soften_edges(
+        view,
+        &points,
+        &mut linear,
+        |here, there| (there - here).abs().max_element() > 0.04,
+        |dir| look(room, view, dir),
+        |point, source| shade(room, point, &smooth[source]),
+    );
     Frame {
         width: view.camera.width,
         height: view.camera.height,
@@ -295,53 +289,6 @@ fn shade(room: &Room, point: &Point, light: &Gathered) -> Vec3 {
         }
     }
     point.albedo * (diffuse * (1.0 - look.glow) + look.glow) + 0.35 * shine
-}
-
-/// Casts three more rays where neighbours belong to different surfaces, with the light of the pixel next to it that
-/// belongs to what the ray found.
-fn soften_edges(
-    room: &Room,
-    view: &View,
-    points: &[Point],
-    smooth: &[Gathered],
-    linear: &mut [Vec3],
-) {
-    let width = view.camera.width as usize;
-    let sharp = linear.to_vec();
-    for i in 0..points.len() {
-        let (u, v) = (i % width, i / width);
-        let mut around = [i; 4];
-        for (slot, (k, inside)) in around.iter_mut().zip([
-            (i.wrapping_sub(1), u > 0),
-            (i + 1, u + 1 < width),
-            (i.wrapping_sub(width), v > 0),
-            (i + width, i + width < points.len()),
-        ]) {
-            if inside {
-                *slot = k;
-            }
-        }
-        let here = &points[i];
-        let differs = |k: &usize| {
-            let other = &points[*k];
-            (other.solid != here.solid || other.normal.dot(here.normal) < 0.8)
-                && (sharp[*k] - sharp[i]).abs().max_element() > 0.04
-        };
-        if !around.iter().any(differs) {
-            continue;
-        }
-        let mut sum = sharp[i];
-        for (dx, dy) in [(0.375, 0.125), (-0.125, 0.375), (-0.25, -0.375)] {
-            let dir = view.ray(u as f32 + dx, v as f32 + dy).normalize();
-            let point = look(room, view, dir);
-            let like = |k: &usize| {
-                points[*k].solid == point.solid && points[*k].normal.dot(point.normal) > 0.8
-            };
-            let source = std::iter::once(i).chain(around).find(like).unwrap_or(i);
-            sum += shade(room, &point, &smooth[source]);
-        }
-        linear[i] = sum * 0.25;
-    }
 }
 
 /// Linear light to sRGB through a film curve (the ACES fit by Narkowicz, 2015).

@@ -7,10 +7,10 @@ use std::sync::mpsc;
 use glam::{Vec2, Vec3, Vec4};
 
 use crate::path::View;
+use crate::point::Point;
 use crate::solid::Shape;
 use crate::training::light::{Arriving, probes};
 use crate::training::plan::HALF_WALL_M;
-use crate::training::render::Point;
 use crate::training::room::{MOST_LIGHTS, TrainingRoom};
 use crate::training::scan::TrainingScan;
 

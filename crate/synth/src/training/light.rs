@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-use crate::training::render::Point;
+use crate::point::Point;
+use crate::room::Light;
 use crate::training::room::TrainingRoom;
 
 /// Light that arrives at a point, linear RGB.
@@ -66,6 +67,50 @@ pub(crate) fn probes() -> Vec<Probe> {
         .collect()
 }
 
+/// A light as a surface sees it that lies before it and that it shines on.
+struct Sight {
+    /// Distance in metres.
+    away: f32,
+    /// Of the angle to the normal, times `away`.
+    cosine: f32,
+    /// What it gives in this direction.
+    given: f32,
+    /// The square of its size.
+    size: f32,
+    /// By how much distance and size weaken it.
+    spent: f32,
+}
+
+impl Sight {
+    /// `to` leads from the surface to the light.
+    fn new(light: &Light, to: Vec3, normal: Vec3) -> Option<Self> {
+        let to_all_sides = light.facing == Vec3::ZERO;
+        let facing = if to_all_sides {
+            1.0
+        } else {
+            -to.dot(light.facing)
+        };
+        let cosine = to.dot(normal);
+        if facing <= 0.0 || cosine <= 0.0 {
+            return None;
+        }
+        let square = to.length_squared();
+        let away = square.sqrt();
+        let size = light.spread[0].length_squared() + light.spread[1].length_squared();
+        Some(Self {
+            away,
+            cosine,
+            given: if to_all_sides {
+                1.0
+            } else {
+                0.15 + 0.85 * facing / away
+            },
+            size,
+            spent: 0.12 + 0.6 * size + square,
+        })
+    }
+}
+
 /// Light straight from the lights at `at`, just above a surface. `dir` comes from the eye.
 pub(crate) fn direct(
     room: &TrainingRoom,
@@ -80,24 +125,17 @@ pub(crate) fn direct(
     for light in &room.lights {
         let spread = light.spread[0] * spot[0] + light.spread[1] * spot[1];
         let to = light.center + spread - at;
-        let facing = if light.facing == Vec3::ZERO {
-            1.0
-        } else {
-            -to.dot(light.facing)
-        };
-        let cosine = to.dot(normal);
-        if facing <= 0.0 || cosine <= 0.0 {
+        let Some(Sight {
+            away,
+            cosine,
+            given,
+            size,
+            spent,
+        }) = Sight::new(light, to, normal)
+        else {
             continue;
-        }
-        let square = to.length_squared();
-        let away = square.sqrt();
-        let given = if light.facing == Vec3::ZERO {
-            1.0
-        } else {
-            0.15 + 0.85 * facing / away
         };
-        let size = light.spread[0].length_squared() + light.spread[1].length_squared();
-        let power = light.power * (given / (0.12 + 0.6 * size + square));
+        let power = light.power * (given / spent);
         let fall = power * (cosine / away);
         if fall.max_element() < enough || room.scene.blocked(at, to / away, away) {
             continue;
@@ -173,24 +211,17 @@ fn strongest(room: &TrainingRoom, at: Vec3, normal: Vec3) -> Vec3 {
     let mut best = (0.0, Vec3::ZERO, Vec3::ZERO);
     for light in &room.lights {
         let to = light.center - at;
-        let facing = if light.facing == Vec3::ZERO {
-            1.0
-        } else {
-            -to.dot(light.facing)
-        };
-        let cosine = to.dot(normal);
-        if facing <= 0.0 || cosine <= 0.0 {
+        let Some(Sight {
+            away,
+            cosine,
+            given,
+            spent,
+            ..
+        }) = Sight::new(light, to, normal)
+        else {
             continue;
-        }
-        let square = to.length_squared();
-        let away = square.sqrt();
-        let given = if light.facing == Vec3::ZERO {
-            1.0
-        } else {
-            0.15 + 0.85 * facing / away
         };
-        let size = light.spread[0].length_squared() + light.spread[1].length_squared();
-        let fall = light.power * (given * cosine / away / (0.12 + 0.6 * size + square));
+        let fall = light.power * (given * cosine / away / spent);
         if fall.element_sum() > best.0 {
             best = (fall.element_sum(), fall, to);
         }

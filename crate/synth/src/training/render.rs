@@ -7,6 +7,7 @@
 use glam::Vec3;
 
 use crate::path::View;
+use crate::point::{Point, soften_edges};
 use crate::training::light::{Arriving, BLOCK, FAR_M, arriving, probes};
 use crate::training::room::TrainingRoom;
 
@@ -17,17 +18,6 @@ pub(crate) struct Linear {
     pub color: Vec<Vec3>,
     /// Along the optical axis in metres; 0 where a ray meets nothing.
     pub depth_m: Vec<f32>,
-}
-
-/// What the first ray of a pixel found.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Point {
-    pub solid: u32,
-    pub t: f32,
-    pub at: Vec3,
-    pub normal: Vec3,
-    pub albedo: Vec3,
-    pub dir: Vec3,
 }
 
 /// Draws what `view` sees.
@@ -63,7 +53,14 @@ pub(crate) fn finish(
         .zip(&light)
         .map(|(point, light)| shade(room, point, light))
         .collect();
-    soften_edges(room, view, points, &light, &mut color);
+    soften_edges(
+        view,
+        points,
+        &mut color,
+        |here, there| (there - here).abs().max_element() > 0.04 * (0.1 + here.max_element()),
+        |dir| look(room, view, dir),
+        |point, source| shade(room, point, &light[source]),
+    );
     let depth = |(i, point): (usize, &Point)| {
         point.t / view.ray((i % width) as f32, (i / width) as f32).length()
     };
@@ -187,52 +184,4 @@ fn shade(room: &TrainingRoom, point: &Point, light: &Arriving) -> Vec3 {
     let look = &room.scene.solids[point.solid as usize].look;
     let diffuse = light.crisp + light.soft + light.around;
     point.albedo * (diffuse + look.glow) + light.shine * (0.35 * look.gloss)
-}
-
-/// Casts three more rays where neighbours belong to different surfaces, with the light of the pixel next to it that
-/// belongs to what the ray found.
-fn soften_edges(
-    room: &TrainingRoom,
-    view: &View,
-    points: &[Point],
-    light: &[Arriving],
-    color: &mut [Vec3],
-) {
-    let width = view.camera.width as usize;
-    let sharp = color.to_vec();
-    for i in 0..points.len() {
-        let (u, v) = (i % width, i / width);
-        let mut around = [i; 4];
-        for (slot, (k, inside)) in around.iter_mut().zip([
-            (i.wrapping_sub(1), u > 0),
-            (i + 1, u + 1 < width),
-            (i.wrapping_sub(width), v > 0),
-            (i + width, i + width < points.len()),
-        ]) {
-            if inside {
-                *slot = k;
-            }
-        }
-        let here = &points[i];
-        let differs = |k: &usize| {
-            let other = &points[*k];
-            (other.solid != here.solid || other.normal.dot(here.normal) < 0.8)
-                && (sharp[*k] - sharp[i]).abs().max_element()
-                    > 0.04 * (0.1 + sharp[i].max_element())
-        };
-        if !around.iter().any(differs) {
-            continue;
-        }
-        let mut sum = sharp[i];
-        for (dx, dy) in [(0.375, 0.125), (-0.125, 0.375), (-0.25, -0.375)] {
-            let dir = view.ray(u as f32 + dx, v as f32 + dy).normalize();
-            let point = look(room, view, dir);
-            let like = |k: &usize| {
-                points[*k].solid == point.solid && points[*k].normal.dot(point.normal) > 0.8
-            };
-            let source = std::iter::once(i).chain(around).find(like).unwrap_or(i);
-            sum += shade(room, &point, &light[source]);
-        }
-        color[i] = sum * 0.25;
-    }
 }
