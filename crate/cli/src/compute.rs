@@ -20,6 +20,17 @@ pub enum DeviceChoice {
 }
 
 impl DeviceChoice {
+    /// Where that is, in words.
+    pub fn name(self, device: &Device) -> String {
+        match self {
+            Self::Cpu => {
+                let threads = std::thread::available_parallelism().map_or(1, usize::from);
+                format!("on the processor, {threads} threads")
+            }
+            Self::Gpu => format!("on {device:?}"),
+        }
+    }
+
     /// burn's device, and what it allows.
     pub fn device(self) -> Result<(Device, Limits), Failure> {
         match self {

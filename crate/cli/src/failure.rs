@@ -44,6 +44,23 @@ pub enum Failure {
          or run `ipdrecon stereo`, which needs none"
     )]
     NoWeights,
+    /// A table of nothing.
+    #[error(
+        "expected --scans with folders or zips of scans with depth, found none; `ipdrecon synth` makes some"
+    )]
+    NoScans,
+    /// Something that should have a name before it.
+    #[error(
+        "expected {option} {expected}, found {found}; give it a name, such as ours=weights.safetensors"
+    )]
+    Named {
+        /// The option.
+        option: &'static str,
+        /// Its form.
+        expected: &'static str,
+        /// What was given.
+        found: String,
+    },
     /// A file that is not the network's weights.
     #[error("{}: {error}", path.display())]
     Weights {

@@ -13,6 +13,7 @@ mod reconstruct;
 mod size;
 mod stereo;
 mod synth;
+mod table;
 mod train;
 
 use clap::{Parser, Subcommand};
@@ -37,6 +38,8 @@ enum Command {
     Reconstruct(reconstruct::Arguments),
     /// Compare a mesh with ground truth, or depth maps with the sensor's depth.
     Eval(eval::Arguments),
+    /// The paper's tables on any scans.
+    Table(table::Arguments),
     /// Look into a scan and say what is wrong with it.
     Doctor(doctor::Arguments),
     /// Make scans of made-up rooms, with exact depth, to learn from.
@@ -51,6 +54,7 @@ fn main() -> ExitCode {
         Command::Stereo(arguments) => stereo::run(&arguments),
         Command::Reconstruct(arguments) => reconstruct::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
+        Command::Table(arguments) => table::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Synth(arguments) => synth::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),

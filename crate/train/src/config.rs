@@ -87,7 +87,8 @@ impl NetChoice {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DataConfig {
-    /// Folders or zips of scans with depth; `folder/*` is every one in it. From the working directory.
+    /// Folders or zips of scans with depth; `folder/*` is every one in it, `list.txt` names one on each line. From the
+    /// working directory.
     pub scans: Vec<PathBuf>,
     /// The same for scans that are only looked at, never learnt from. May be empty.
     #[serde(default)]

@@ -10,7 +10,7 @@ pub mod views;
 pub mod volume;
 
 pub use sample::{Augment, SampleOptions, Sampler};
-pub use set::{Opener, ScanEntry, ScanSet};
+pub use set::{Opener, ScanEntry, ScanSet, scans_at};
 
 use std::path::Path;
 

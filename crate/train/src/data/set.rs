@@ -44,7 +44,7 @@ pub struct ScanSet {
 }
 
 impl ScanSet {
-    /// The scans in folders and zips. `*` as the last part of a path takes every folder in it that is not hidden.
+    /// The scans that [`scans_at`] finds at each path.
     ///
     /// # Errors
     /// When nothing matches, or a scan cannot be opened, has no depth or has fewer than `views` frames.
@@ -56,7 +56,7 @@ impl ScanSet {
     ) -> Result<Self, TrainError> {
         let mut folders = Vec::new();
         for path in paths {
-            folders.extend(expand(path)?);
+            folders.extend(scans_at(path)?);
         }
         let names: Vec<String> = folders.iter().map(|f| f.display().to_string()).collect();
         let open: Opener = Arc::new(move |i| open_path(&folders[i]));
@@ -316,8 +316,16 @@ fn open_path(path: &Path) -> Result<Scan, TrainError> {
     scan::open(Rc::new(FolderSource::open(path).map_err(source)?)).map_err(failed)
 }
 
-/// `folder/*` to the folders and zips in it, in the order of their names.
-fn expand(path: &Path) -> Result<Vec<PathBuf>, TrainError> {
+/// The scans that a path names: `FOLDER/*` all folders and zips in it that are not hidden, in the order of their names;
+/// `FILE.txt` one on each of its lines, from where the file lies, but for empty lines and those that begin with `#`;
+/// anything else itself.
+///
+/// # Errors
+/// A folder or a list that cannot be read, or that holds none.
+pub fn scans_at(path: &Path) -> Result<Vec<PathBuf>, TrainError> {
+    if path.extension().is_some_and(|ending| ending == "txt") {
+        return listed(path);
+    }
     if path.file_name().is_none_or(|name| name != "*") {
         return Ok(vec![path.to_owned()]);
     }
@@ -342,4 +350,21 @@ fn expand(path: &Path) -> Result<Vec<PathBuf>, TrainError> {
         ));
     }
     Ok(found)
+}
+
+fn listed(path: &Path) -> Result<Vec<PathBuf>, TrainError> {
+    let text = std::fs::read_to_string(path).map_err(|e| TrainError::file("read", path, e))?;
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let lines = text.lines().map(str::trim);
+    let named = lines.filter(|line| !line.is_empty() && !line.starts_with('#'));
+    let scans: Vec<PathBuf> = named.map(|line| folder.join(line)).collect();
+    if scans.is_empty() {
+        return Err(TrainError::unfit(
+            path.display(),
+            "a scan on each line",
+            "none",
+            "write folders or zips of scans into it, from where it lies",
+        ));
+    }
+    Ok(scans)
 }

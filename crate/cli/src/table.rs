@@ -1,0 +1,164 @@
+//! `ipdrecon table`: the paper's Tables 3 to 8 on any scans, as Markdown and JSON.
+
+mod efficiency;
+mod figures;
+mod layout;
+mod measure;
+mod method;
+mod scans;
+
+use crate::{compute::DeviceChoice, failure::Failure, size::Size};
+use clap::{Args, ValueEnum};
+use layout::Table;
+use measure::Setting;
+use method::{Method, named};
+use recon::{NetworkConfig, evaluate};
+use std::{fs, path::PathBuf};
+
+/// What `table` is told.
+#[derive(Args)]
+pub struct Arguments {
+    /// Which of the paper's tables.
+    #[arg(value_enum)]
+    kind: Kind,
+    /// Scans with depth: folders and zips; FOLDER/* is every one in it; FILE.txt names one on each line, from where it
+    /// lies. For `generalization` each is a set, which NAME=… names.
+    #[arg(long, num_args = 1.., value_name = "SCAN")]
+    scans: Vec<String>,
+    /// The weights of the row "ours".
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+    /// The weights of the row "baseline": the network trained alike with all of its switches off.
+    #[arg(long, value_name = "FILE")]
+    baseline: Option<PathBuf>,
+    /// Weights of one more row.
+    #[arg(long, value_name = "NAME=FILE")]
+    row: Vec<String>,
+    /// Take at most this many keyframes of a scan, evenly spread, for every row; several for `views`, such as 60,80,100.
+    /// Without it all are taken. For `efficiency`: views of a chunk.
+    #[arg(long, value_delimiter = ',')]
+    views: Vec<usize>,
+    /// Make each tile of the room from at most this many of them; without it what suits the weights.
+    #[arg(long)]
+    tile_views: Option<usize>,
+    /// Choose the views of a tile at random with the seeds 0, 1, … below this; without it by what they cover, which no
+    /// seed changes.
+    #[arg(long)]
+    seeds: Option<u64>,
+    /// How meshes are compared.
+    #[arg(long, value_enum, default_value_t = Protocol::TransformerFusion)]
+    protocol: Protocol,
+    /// A folder with the true mesh of each scan, NAME.ply in the scan's own world. Without it that is gt.ply in the scan's
+    /// folder, or else fused from depth.
+    #[arg(long, value_name = "FOLDER")]
+    truth: Option<PathBuf>,
+    /// Depth counts up to this many metres, in the truth as in every row.
+    #[arg(long, value_name = "METRES", default_value_t = NetworkConfig::default().reach_m)]
+    reach: f32,
+    /// Pictures are scaled down to fit into this many pixels; without it what suits the weights.
+    #[arg(long, value_name = "WIDTHxHEIGHT")]
+    size: Option<Size>,
+    /// Where to compute.
+    #[arg(long, value_enum, default_value_t = DeviceChoice::Cpu)]
+    device: DeviceChoice,
+    /// Write every single figure into this file too.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// The paper's tables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Kind {
+    /// Table 4: depth that the meshes show to the scan's cameras.
+    Depth,
+    /// Table 3: accuracy, completeness, precision, recall and F of the meshes.
+    Mesh,
+    /// Table 5: how much quality depends on the number of views.
+    Views,
+    /// Table 6: milliseconds of the network's parts.
+    Efficiency,
+    /// Table 7: other sets of scans.
+    Generalization,
+    /// Table 8: what each switch of the network does.
+    Ablation,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Protocol {
+    Vortx,
+    #[value(name = "transformerfusion")]
+    TransformerFusion,
+    Plain,
+}
+
+/// Runs `table`.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let (device, limits) = arguments.device.device()?;
+    let networks = arguments.networks(&device)?;
+    let table = if arguments.kind == Kind::Efficiency {
+        let views = match arguments.views.as_slice() {
+            [] => &[20, 60, 100],
+            views => views,
+        };
+        let name = arguments.device.name(&device);
+        efficiency::table(&networks, views, arguments.size, &device, &name)
+    } else {
+        let sets = scans::sets(&arguments.scans)?;
+        let setting = Setting {
+            views: match arguments.views.as_slice() {
+                [] => vec![None],
+                views => views.iter().copied().map(Some).collect(),
+            },
+            tile_views: arguments.tile_views,
+            seeds: arguments.seeds,
+            protocol: match arguments.protocol {
+                Protocol::Vortx => evaluate::Protocol::Vortx,
+                Protocol::TransformerFusion => evaluate::Protocol::TransformerFusion,
+                Protocol::Plain => evaluate::Protocol::Plain,
+            },
+            truth: arguments.truth.clone(),
+            reach_m: arguments.reach,
+            size: arguments.size.map(|size| size.0),
+            device_name: arguments.device.name(&device),
+            device,
+            limits,
+        };
+        let mut methods = vec![Method::sensor(), Method::stereo()];
+        methods.extend(networks);
+        let cells = measure::all(&sets, &methods, &setting)?;
+        layout::table(arguments.kind, &methods, &cells, &setting)
+    };
+    arguments.write(&table)
+}
+
+impl Arguments {
+    /// The rows that networks make: the baseline, ours, and whatever else was named.
+    fn networks(&self, device: &burn::tensor::Device) -> Result<Vec<Method>, Failure> {
+        let mut rows = vec![
+            ("baseline".to_owned(), self.baseline.clone()),
+            ("ours".to_owned(), self.weights.clone()),
+        ];
+        for row in &self.row {
+            let (name, file) = named(row).ok_or_else(|| Failure::Named {
+                option: "--row",
+                expected: "NAME=FILE",
+                found: row.clone(),
+            })?;
+            rows.push((name.to_owned(), Some(file.into())));
+        }
+        let methods = rows.into_iter().map(|(name, file)| match file {
+            None => Ok(Method::missing(name)),
+            Some(file) => Method::network(name, &file, device),
+        });
+        methods.collect()
+    }
+
+    fn write(&self, table: &Table) -> Result<(), Failure> {
+        if let Some(file) = &self.json {
+            let text = serde_json::to_string_pretty(&table.json)?;
+            fs::write(file, text).map_err(|error| Failure::file("write", file, error))?;
+        }
+        print!("{}", table.markdown);
+        Ok(())
+    }
+}

@@ -1,0 +1,322 @@
+//! The tables as Markdown and JSON.
+
+use super::{
+    Kind,
+    figures::{Cell, Means, means, steadiness},
+    measure::Setting,
+    method::Method,
+};
+use serde_json::{Value, json};
+
+/// A finished table.
+pub struct Table {
+    /// To read.
+    pub markdown: String,
+    /// Every single figure, to reckon with.
+    pub json: Value,
+}
+
+/// The numbers of views that the paper's stability is about.
+const PAPERS_VIEWS: [usize; 3] = [60, 80, 100];
+
+/// The table of what was measured.
+pub fn table(kind: Kind, methods: &[Method], cells: &[Cell], setting: &Setting) -> Table {
+    let body = match kind {
+        Kind::Depth => depth(methods, cells, setting),
+        Kind::Views => views(methods, cells, setting),
+        Kind::Generalization => generalization(methods, cells, setting),
+        Kind::Ablation => ablation(methods, cells, setting),
+        Kind::Mesh | Kind::Efficiency => mesh(methods, cells, setting),
+    };
+    let notes = notes(methods, cells, setting);
+    Table {
+        markdown: format!("{body}\n{}", notes.join("\n") + "\n"),
+        json: json!({
+            "table": format!("{kind:?}").to_lowercase(),
+            "notes": notes,
+            "cells": cells,
+        }),
+    }
+}
+
+/// Rows of a Markdown table under a head.
+pub fn rows(head: &[&str], rows: &[Vec<String>]) -> String {
+    let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+    let head: Vec<String> = head.iter().map(|cell| (*cell).to_owned()).collect();
+    let rule = format!("|{}\n", "---|".repeat(head.len()));
+    let body: String = rows.iter().map(|row| line(row)).collect();
+    line(&head) + &rule + &body
+}
+
+/// The means of a method with a number of views over all scans that `chosen` takes.
+fn of(
+    cells: &[Cell],
+    method: &Method,
+    views: Option<usize>,
+    chosen: impl Fn(&Cell) -> bool,
+) -> Option<Means> {
+    let fits = |cell: &&Cell| cell.method == method.name && cell.views == views && chosen(cell);
+    means(cells.iter().filter(fits))
+}
+
+/// The name of a row: with the number of views where there are several.
+fn name(method: &Method, views: Option<usize>, setting: &Setting) -> String {
+    match views {
+        Some(views) if setting.views.len() > 1 => format!("{}, {views} views", method.name),
+        _ => method.name.clone(),
+    }
+}
+
+/// A row for each method and number of views; `figures` are what follows the name, `width` of them.
+fn each(
+    methods: &[Method],
+    cells: &[Cell],
+    setting: &Setting,
+    width: usize,
+    figures: impl Fn(&Means) -> Vec<String>,
+) -> Vec<Vec<String>> {
+    let mut rows = Vec::new();
+    for method in methods {
+        for &views in &setting.views {
+            let mut row = vec![name(method, views, setting)];
+            match of(cells, method, views, |_| true) {
+                Some(means) => row.extend(figures(&means)),
+                None => row.resize(width + 1, "–".to_owned()),
+            }
+            rows.push(row);
+        }
+    }
+    rows
+}
+
+fn share(value: f64) -> String {
+    format!("{value:.3}")
+}
+
+fn mesh(methods: &[Method], cells: &[Cell], setting: &Setting) -> String {
+    let head = [
+        "",
+        "Acc (m)",
+        "Comp (m)",
+        "Chamfer (m)",
+        "Prec",
+        "Recall",
+        "F",
+        "keyframes",
+        "s",
+    ];
+    let figures = |means: &Means| {
+        let mut row: Vec<String> = means.surface.map(share).to_vec();
+        row.push(format!("{:.0}", means.keyframes));
+        row.push(format!("{:.1}", means.seconds));
+        row
+    };
+    rows(
+        &head,
+        &each(methods, cells, setting, head.len() - 1, figures),
+    )
+}
+
+fn depth(methods: &[Method], cells: &[Cell], setting: &Setting) -> String {
+    let head = [
+        "",
+        "Abs Rel",
+        "Abs Diff (m)",
+        "Sq Rel (m)",
+        "RMSE (m)",
+        "δ < 1.25",
+        "δ < 1.25²",
+        "δ < 1.25³",
+        "Comp",
+    ];
+    let figures = |means: &Means| match &means.depth {
+        None => vec!["–".to_owned(); 8],
+        Some(of) => [
+            of.abs_rel,
+            of.abs_diff,
+            of.sq_rel,
+            of.rmse,
+            of.delta_1,
+            of.delta_2,
+            of.delta_3,
+            of.completeness,
+        ]
+        .map(share)
+        .to_vec(),
+    };
+    rows(
+        &head,
+        &each(methods, cells, setting, head.len() - 1, figures),
+    )
+}
+
+fn views(methods: &[Method], cells: &[Cell], setting: &Setting) -> String {
+    let quality = rows(
+        &["", "Prec", "Recall", "F", "keyframes"],
+        &each(methods, cells, setting, 4, |means| {
+            let [.., precision, recall, f] = means.surface;
+            let mut row = [precision, recall, f].map(share).to_vec();
+            row.push(format!("{:.0}", means.keyframes));
+            row
+        }),
+    );
+    let counts = steady_counts(setting);
+    let list: Vec<String> = counts.iter().map(usize::to_string).collect();
+    let list = list.join(", ");
+    let percent = |value: f64| format!("{:.2}", 100.0 * value);
+    let steady: Vec<Vec<String>> = methods
+        .iter()
+        .map(|method| {
+            let means: Option<Vec<Means>> = counts
+                .iter()
+                .map(|&views| of(cells, method, Some(views), |_| true))
+                .collect();
+            let mut row = vec![method.name.clone()];
+            match means
+                .filter(|means| means.len() > 1)
+                .and_then(|means| steadiness(&means))
+            {
+                None => row.resize(7, "–".to_owned()),
+                Some(of) => row.extend([
+                    percent(of.cv_sample),
+                    percent(of.cv_population),
+                    percent(of.retention_f),
+                    percent(of.retention),
+                    percent(of.max_drop),
+                    format!("{:.3}", of.stability),
+                ]),
+            }
+            row
+        })
+        .collect();
+    let head = [
+        "",
+        "CV, sample (%)",
+        "CV, population (%)",
+        "PRR of F (%)",
+        "mean PRR (%)",
+        "MaxDrop (%)",
+        "SI",
+    ];
+    format!(
+        "{quality}\nStability over {list} views:\n\n{}",
+        rows(&head, &steady)
+    )
+}
+
+/// The paper's numbers of views, as far as they were measured; all if they were not.
+fn steady_counts(setting: &Setting) -> Vec<usize> {
+    let mut all: Vec<usize> = setting.views.iter().flatten().copied().collect();
+    all.sort_unstable();
+    let papers: Vec<usize> = all
+        .iter()
+        .copied()
+        .filter(|views| PAPERS_VIEWS.contains(views))
+        .collect();
+    if papers.len() > 1 { papers } else { all }
+}
+
+fn generalization(methods: &[Method], cells: &[Cell], setting: &Setting) -> String {
+    let mut sets: Vec<&str> = cells.iter().map(|cell| cell.set.as_str()).collect();
+    sets.dedup();
+    let mut found = Vec::new();
+    for set in sets {
+        for method in methods {
+            for &views in &setting.views {
+                let mut row = vec![set.to_owned(), name(method, views, setting)];
+                match of(cells, method, views, |cell| cell.set == set) {
+                    None => row.resize(6, "–".to_owned()),
+                    Some(means) => {
+                        let [.., precision, recall, f] = means.surface;
+                        row.extend([precision, recall, f].map(share));
+                        row.push(means.cells.to_string());
+                    }
+                }
+                found.push(row);
+            }
+        }
+    }
+    rows(&["set", "", "Prec", "Recall", "F", "meshes"], &found)
+}
+
+fn ablation(methods: &[Method], cells: &[Cell], setting: &Setting) -> String {
+    let mut found = Vec::new();
+    for method in methods {
+        for &views in &setting.views {
+            let mut row = vec![name(method, views, setting)];
+            row.extend(match method.config() {
+                None => vec![String::new(); 5],
+                Some(config) => [
+                    config.pce,
+                    config.acm,
+                    config.ipsd,
+                    config.matching,
+                    config.guide,
+                ]
+                .map(|on| if on { "yes" } else { "" }.to_owned())
+                .to_vec(),
+            });
+            match of(cells, method, views, |_| true) {
+                None => row.resize(9, "–".to_owned()),
+                Some(means) => row.extend(means.surface[3..].iter().map(|value| share(*value))),
+            }
+            found.push(row);
+        }
+    }
+    let head = [
+        "", "PCE", "ACM", "IPSD", "matching", "guide", "Prec", "Recall", "F",
+    ];
+    rows(&head, &found)
+}
+
+/// What must be known to read the figures.
+fn notes(methods: &[Method], cells: &[Cell], setting: &Setting) -> Vec<String> {
+    let mut scans: Vec<(&str, &str)> = cells
+        .iter()
+        .map(|c| (c.set.as_str(), c.scan.as_str()))
+        .collect();
+    scans.sort_unstable();
+    scans.dedup();
+    let truth = match &setting.truth {
+        Some(_) => "meshes that were given".to_owned(),
+        None => format!(
+            "gt.ply of a scan, or fused from all of its depth up to {} m",
+            setting.reach_m
+        ),
+    };
+    let views: Vec<String> = setting
+        .views
+        .iter()
+        .map(|views| views.map_or("all".to_owned(), |views| views.to_string()))
+        .collect();
+    let choice = match setting.seeds {
+        Some(seeds) => format!("views of a tile at random, {seeds} seeds"),
+        None => "views of a tile by coverage, which has no chance in it".to_owned(),
+    };
+    let tile = match setting.tile_views {
+        Some(views) => format!("{views} views a tile"),
+        None => "20 views a tile for small networks, 100 for full ones".to_owned(),
+    };
+    let mut notes = vec![format!(
+        "{} scans, means over meshes; protocol {:?}, threshold 5 cm; truth {truth}; keyframes of a scan: {}; tiles of 3.84 x 3.84 x 1.92 m, {tile}; \
+         {choice}; {}; version {}, commit {}.",
+        scans.len(),
+        setting.protocol,
+        views.join(", "),
+        setting.device_name,
+        env!("CARGO_PKG_VERSION"),
+        env!("IPDRECON_COMMIT"),
+    )];
+    for method in methods.iter().filter(|method| !method.is_there()) {
+        notes.push(format!("- {}: no weights were given.", method.name));
+    }
+    for cell in cells {
+        if let Err(why) = &cell.figures {
+            notes.push(format!(
+                "- {}, {}: no mesh, counted as 1 m, precision 1, recall 0: {why}",
+                cell.method, cell.scan
+            ));
+        }
+    }
+    notes
+}

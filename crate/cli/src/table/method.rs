@@ -1,0 +1,177 @@
+//! The rows of a table: ways from a scan to a mesh.
+
+use super::measure::Setting;
+use crate::failure::Failure;
+use burn::tensor::Device;
+use mesh::Mesh;
+use net::{Ipdrecon, NetConfig, weights};
+use recon::{DepthSource, Flow, NetworkConfig, Options, Preset, Sink, ViewChoice};
+use scan::Scan;
+use std::{fs, path::Path, time::Instant};
+use stereo::StereoConfig;
+
+/// A way to make a mesh.
+pub struct Method {
+    /// What the row is called.
+    pub name: String,
+    source: Source,
+}
+
+enum Source {
+    /// The sensor's own depth: what could be had at best.
+    Sensor,
+    Stereo,
+    Network(Box<Ipdrecon>),
+    /// A row that the table has and nobody gave weights for.
+    Missing,
+}
+
+/// A mesh, and what it took.
+pub struct Made {
+    /// In the scan's own world.
+    pub mesh: Mesh,
+    /// Keyframes it was made from.
+    pub keyframes: usize,
+    /// Seconds from the scan to the mesh.
+    pub seconds: f64,
+}
+
+/// `NAME=REST` in its two halves.
+pub fn named(text: &str) -> Option<(&str, &str)> {
+    let halves = text.split_once('=')?;
+    (!halves.0.is_empty() && !halves.1.is_empty()).then_some(halves)
+}
+
+impl Method {
+    /// Fusion of the sensor's depth.
+    pub fn sensor() -> Self {
+        Self {
+            name: "depth fusion".to_owned(),
+            source: Source::Sensor,
+        }
+    }
+
+    /// Stereo.
+    pub fn stereo() -> Self {
+        Self {
+            name: "stereo".to_owned(),
+            source: Source::Stereo,
+        }
+    }
+
+    /// A row without figures.
+    pub fn missing(name: String) -> Self {
+        Self {
+            name,
+            source: Source::Missing,
+        }
+    }
+
+    /// A network with the weights of a file.
+    ///
+    /// # Errors
+    /// A file that is no weights.
+    pub fn network(name: String, path: &Path, device: &Device) -> Result<Self, Failure> {
+        let bytes = fs::read(path).map_err(|error| Failure::file("read", path, error))?;
+        let network = weights::load(&bytes, device).map_err(|error| Failure::Weights {
+            path: path.to_owned(),
+            error: Box::new(error),
+        })?;
+        Ok(Self {
+            name,
+            source: Source::Network(Box::new(network)),
+        })
+    }
+
+    /// Whether it makes meshes.
+    pub fn is_there(&self) -> bool {
+        !matches!(self.source, Source::Missing)
+    }
+
+    /// The network, where it is one.
+    pub fn as_network(&self) -> Option<&Ipdrecon> {
+        match &self.source {
+            Source::Network(network) => Some(network),
+            _ => None,
+        }
+    }
+
+    /// What the network is made of, where it is one.
+    pub fn config(&self) -> Option<&NetConfig> {
+        self.as_network().map(Ipdrecon::config)
+    }
+
+    /// The mesh of a scan from at most `views` keyframes. `None` for a row that is not there.
+    ///
+    /// # Errors
+    /// What the run says.
+    pub fn mesh(
+        &self,
+        scan: &Scan,
+        views: Option<usize>,
+        seed: u64,
+        setting: &Setting,
+    ) -> Result<Option<Made>, Failure> {
+        let started = Instant::now();
+        let depth = match &self.source {
+            Source::Missing => return Ok(None),
+            Source::Sensor => DepthSource::Sensor,
+            Source::Stereo => DepthSource::Stereo(StereoConfig::default()),
+            Source::Network(network) => {
+                DepthSource::Network(network_config(network.config(), seed, setting))
+            }
+        };
+        let options = Options {
+            views,
+            max_depth_m: setting.reach_m,
+            depth: Some(depth),
+            ..Options::default()
+        };
+        let plan = recon::plan(scan, &setting.limits, options)?;
+        let outcome = pollster::block_on(async {
+            match &self.source {
+                Source::Network(network) => {
+                    let network = network.as_ref();
+                    recon::reconstruct(scan, &plan, network, &setting.device, &mut Quiet).await
+                }
+                _ => recon::run(scan, &plan, &setting.device, &mut Quiet).await,
+            }
+        })?;
+        let mut mesh = pollster::block_on(outcome.volume.mesh())?;
+        if mesh.triangles.is_empty() {
+            return Err(Failure::NoSurface {
+                keyframes: outcome.frames_fused,
+            });
+        }
+        recon::place(&mut mesh, scan, false);
+        Ok(Some(Made {
+            mesh,
+            keyframes: plan.keyframes.len(),
+            seconds: started.elapsed().as_secs_f64(),
+        }))
+    }
+}
+
+fn network_config(config: &NetConfig, seed: u64, setting: &Setting) -> NetworkConfig {
+    let usual = Preset::of(config).config();
+    NetworkConfig {
+        size: setting.size.unwrap_or(usual.size),
+        views_a_tile: setting.tile_views.unwrap_or(usual.views_a_tile),
+        reach_m: setting.reach_m,
+        seed,
+        choice: match setting.seeds {
+            Some(_) => ViewChoice::Random,
+            None => ViewChoice::Coverage,
+        },
+        ..usual
+    }
+}
+
+/// Nobody watches.
+struct Quiet;
+
+impl Sink for Quiet {
+    async fn checkpoint(&mut self) -> Flow {
+        Flow::Continue
+    }
+}
