@@ -95,6 +95,8 @@ pub struct DataConfig {
     pub validation: Vec<PathBuf>,
     /// Pictures in a sample.
     pub views: usize,
+    /// Where given, a sample has any number of pictures from this to `views`.
+    pub least_views: Option<usize>,
     /// Width and height of the pictures: multiples of 16.
     pub size: [u32; 2],
     /// Fine voxels (4 cm) of a sample along x, y and z: multiples of 4.
@@ -263,6 +265,13 @@ impl TrainConfig {
         if data.max_depth_m.is_nan() || data.max_depth_m <= 0.0 {
             let found = data.max_depth_m.to_string();
             return unfit("data.max_depth_m", "a length above 0", found);
+        }
+        if data
+            .least_views
+            .is_some_and(|least| least == 0 || least > data.views)
+        {
+            let found = format!("{:?}", data.least_views);
+            return unfit("data.least_views", "from 1 to data.views", found);
         }
         let counts = [
             ("data.views", data.views),

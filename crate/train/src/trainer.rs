@@ -346,7 +346,10 @@ impl ModuleMapper for Fix {
 fn sample_options(config: &TrainConfig, augment: Augment) -> SampleOptions {
     SampleOptions {
         seed: config.seed,
-        views: config.data.views,
+        views: [
+            config.data.least_views.unwrap_or(config.data.views),
+            config.data.views,
+        ],
         size: config.data.size,
         crop: config.data.crop,
         least_seen: config.data.least_seen,

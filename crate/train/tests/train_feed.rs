@@ -14,7 +14,7 @@ use train::feed::Feed;
 fn samples(threads: usize, first: u64, count: usize) -> Vec<Sample> {
     let set = common::rooms(3, 16, 80, 60);
     let options = SampleOptions {
-        views: 4,
+        views: [4; 2],
         size: [64, 48],
         crop: [32, 32, 16],
         augment: Augment::default(),
@@ -139,4 +139,19 @@ fn a_crop_may_be_larger_than_the_scan() {
     let known = outside.clone().filter(|(_, known)| *known);
     assert!(outside.count() == 48 * 32 && known.count() == 48 * 32);
     assert!(fine.iter().any(|(value, _)| value.abs() < 0.5));
+}
+
+#[test]
+fn samples_have_as_many_views_as_asked_or_any_number_between() {
+    let options = SampleOptions {
+        views: [2, 5],
+        ..common::plain(1)
+    };
+    let mut sampler = Sampler::new(common::rooms(1, 8, 80, 60), options);
+    let mut counts: Vec<usize> = (0..40)
+        .map(|number| sampler.sample(number).unwrap().views.len())
+        .collect();
+    counts.sort_unstable();
+    counts.dedup();
+    assert_eq!(counts, [2, 3, 4, 5]);
 }

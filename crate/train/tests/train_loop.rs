@@ -180,7 +180,7 @@ fn adam_is_burns() {
     let mut sampler = train::data::Sampler::new(
         set,
         train::data::SampleOptions {
-            views: 2,
+            views: [2; 2],
             size: [32, 32],
             crop: [16, 16, 16],
             ..common::plain(1)

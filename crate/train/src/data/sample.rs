@@ -52,8 +52,8 @@ impl Default for Augment {
 pub struct SampleOptions {
     /// Decides everything drawn by chance.
     pub seed: u64,
-    /// Pictures in a sample.
-    pub views: usize,
+    /// Pictures in a sample: any number between these, both included.
+    pub views: [usize; 2],
     /// Width and height of the pictures.
     pub size: [u32; 2],
     /// Fine points of the crop along x, y and z.
@@ -153,7 +153,13 @@ impl Sampler {
             Sight::new(seen, points.len(), self.options.least_seen)
         };
         let all = entry.frames.len();
-        views::choose(self.options.views, all, &entry.keyframes, see, random)
+        let [least, most] = self.options.views;
+        let count = if least < most {
+            least + random.below(most - least + 1)
+        } else {
+            most
+        };
+        views::choose(count, all, &entry.keyframes, see, random)
     }
 
     fn add_view(

@@ -48,7 +48,7 @@ pub fn rooms(count: u64, frames: usize, width: u32, height: u32) -> Arc<ScanSet>
 pub fn plain(seed: u64) -> SampleOptions {
     SampleOptions {
         seed,
-        views: 8,
+        views: [8; 2],
         size: [160, 112],
         crop: [48, 48, 32],
         least_seen: 0.2,
