@@ -2,9 +2,12 @@
 
 mod efficiency;
 mod figures;
+mod grid;
 mod layout;
 mod measure;
 mod method;
+mod picture;
+mod report;
 mod scans;
 
 use crate::{compute::DeviceChoice, failure::Failure, size::Size};
@@ -13,6 +16,7 @@ use layout::Table;
 use measure::Setting;
 use method::{Method, named};
 use recon::{NetworkConfig, evaluate};
+use report::Report;
 use std::{fs, path::PathBuf};
 
 /// What `table` is told.
@@ -61,6 +65,9 @@ pub struct Arguments {
     /// Where to compute.
     #[arg(long, value_enum, default_value_t = DeviceChoice::Cpu)]
     device: DeviceChoice,
+    /// Write a page into this folder: the table, plots, and every mesh beside the truth, coloured by its errors.
+    #[arg(long, value_name = "FOLDER")]
+    report: Option<PathBuf>,
     /// Write every single figure into this file too.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -81,6 +88,20 @@ pub enum Kind {
     Generalization,
     /// Table 8: what each switch of the network does.
     Ablation,
+}
+
+impl Kind {
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Depth => "depth",
+            Self::Mesh => "mesh",
+            Self::Views => "views",
+            Self::Efficiency => "efficiency",
+            Self::Generalization => "generalization",
+            Self::Ablation => "ablation",
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -125,8 +146,17 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         };
         let mut methods = vec![Method::sensor(), Method::stereo()];
         methods.extend(networks);
-        let cells = measure::all(&sets, &methods, &setting)?;
-        layout::table(arguments.kind, &methods, &cells, &setting)
+        let mut report = arguments
+            .report
+            .as_deref()
+            .map(Report::create)
+            .transpose()?;
+        let cells = measure::all(&sets, &methods, &setting, report.as_mut())?;
+        let table = layout::table(arguments.kind, &methods, &cells, &setting);
+        if let Some(report) = report {
+            report.write(&table, &cells)?;
+        }
+        table
     };
     arguments.write(&table)
 }
@@ -155,10 +185,10 @@ impl Arguments {
 
     fn write(&self, table: &Table) -> Result<(), Failure> {
         if let Some(file) = &self.json {
-            let text = serde_json::to_string_pretty(&table.json)?;
+            let text = serde_json::to_string_pretty(&table.json())?;
             fs::write(file, text).map_err(|error| Failure::file("write", file, error))?;
         }
-        print!("{}", table.markdown);
+        print!("{}", table.markdown());
         Ok(())
     }
 }

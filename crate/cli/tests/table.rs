@@ -158,6 +158,51 @@ fn steadiness_follows_the_papers_formulas() {
 }
 
 #[test]
+fn a_report_shows_every_mesh() {
+    let folder = folder();
+    let [one, report] = ["rooms/one", "report"].map(|name| folder.path().join(name));
+    let more = [
+        "--scans",
+        str(&one),
+        "--views",
+        "4,8",
+        "--report",
+        str(&report),
+    ];
+    let (markdown, _) = table(folder.path(), "views", &more);
+    let page = fs::read_to_string(report.join("index.html")).unwrap();
+    let f = row(&markdown, "stereo, 8 views")[2];
+    assert!(page.contains(&format!("<td>{f}</td>")), "{f}: {page}");
+    assert!(page.contains("<polyline"), "{page}");
+    let pictures: Vec<&str> = page
+        .split("src=\"")
+        .skip(1)
+        .map(|rest| rest.split('"').next().unwrap())
+        .collect();
+    // The truth, and for three methods what was found and what is missing.
+    assert_eq!(pictures.len(), 7, "{pictures:?}");
+    for picture in pictures {
+        let decoder = png::Decoder::new(std::io::BufReader::new(
+            fs::File::open(report.join(picture)).unwrap(),
+        ));
+        let mut reader = decoder.read_info().unwrap();
+        let mut rgb = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut rgb).unwrap();
+        let drawn = rgb.chunks(3).filter(|rgb| **rgb != [255; 3]).count();
+        assert!(drawn * 20 > rgb.len() / 3, "{picture}: {drawn} pixels");
+        // The sensor's own depth is nowhere as far off as to be red; what is not there cannot be.
+        if picture.contains("depth_fusion-found") {
+            let red = rgb
+                .chunks(3)
+                .filter(|rgb| rgb[0] / 2 > rgb[1].max(rgb[2]))
+                .count();
+            assert!(red * 50 < drawn, "{red} of {drawn}");
+        }
+    }
+    assert!(page.contains("most missing"), "{page}");
+}
+
+#[test]
 fn other_sets_and_switches_have_columns_of_their_own() {
     let folder = folder();
     let [one, two] = ["one", "two"].map(|name| folder.path().join("rooms").join(name));

@@ -49,6 +49,12 @@ pub fn place(mesh: &mut Mesh, scan: &Scan, canonical: bool) -> Vec3 {
     }
     let scan_from_canonical = scan.scan_from_canonical();
     mesh.transform(&scan_from_canonical);
+    up(scan)
+}
+
+/// Which way is up in the scan's own world.
+pub fn up(scan: &Scan) -> Vec3 {
+    let scan_from_canonical = scan.scan_from_canonical();
     scan_from_canonical.transform_vector3(DVec3::Z).as_vec3()
 }
 

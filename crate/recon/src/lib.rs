@@ -7,7 +7,7 @@ mod event;
 mod plan;
 mod run;
 
-pub use convert::{pinhole, place, pose};
+pub use convert::{pinhole, place, pose, up};
 pub use event::{Flow, Sink, Stage};
 pub use net::Level;
 pub use plan::{

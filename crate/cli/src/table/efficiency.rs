@@ -1,9 +1,6 @@
 //! The paper's Table 6: what a picture and what a piece of a room cost.
 
-use super::{
-    layout::{Table, rows},
-    method::Method,
-};
+use super::{Kind, grid::Grid, layout::Table, method::Method};
 use crate::size::Size;
 use burn::tensor::{Device, Tensor, TensorData};
 use glam::{Affine3A, IVec3, Mat3, Vec3};
@@ -76,8 +73,10 @@ pub fn table(
         env!("IPDRECON_COMMIT"),
     );
     Table {
-        markdown: format!("{}\n{note}\n", rows(&head, &found)),
-        json: json!({ "table": "efficiency", "notes": [note], "cells": figures }),
+        kind: Kind::Efficiency.name(),
+        grids: vec![Grid::new(&head, found)],
+        notes: vec![note],
+        cells: json!(figures),
     }
 }
 

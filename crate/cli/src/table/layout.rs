@@ -1,8 +1,9 @@
-//! The tables as Markdown and JSON.
+//! What is in which table.
 
 use super::{
     Kind,
     figures::{Cell, Means, means, steadiness},
+    grid::Grid,
     measure::Setting,
     method::Method,
 };
@@ -10,10 +11,27 @@ use serde_json::{Value, json};
 
 /// A finished table.
 pub struct Table {
-    /// To read.
-    pub markdown: String,
+    /// Which of the paper's.
+    pub kind: &'static str,
+    /// Figures.
+    pub grids: Vec<Grid>,
+    /// What must be known to read them.
+    pub notes: Vec<String>,
     /// Every single figure, to reckon with.
-    pub json: Value,
+    pub cells: Value,
+}
+
+impl Table {
+    /// To read.
+    pub fn markdown(&self) -> String {
+        let grids: Vec<String> = self.grids.iter().map(Grid::markdown).collect();
+        format!("{}\n{}\n", grids.join("\n"), self.notes.join("\n"))
+    }
+
+    /// To reckon with.
+    pub fn json(&self) -> Value {
+        json!({ "table": self.kind, "notes": self.notes, "cells": self.cells })
+    }
 }
 
 /// The numbers of views that the paper's stability is about.
@@ -21,31 +39,19 @@ const PAPERS_VIEWS: [usize; 3] = [60, 80, 100];
 
 /// The table of what was measured.
 pub fn table(kind: Kind, methods: &[Method], cells: &[Cell], setting: &Setting) -> Table {
-    let body = match kind {
-        Kind::Depth => depth(methods, cells, setting),
+    let grids = match kind {
+        Kind::Depth => vec![depth(methods, cells, setting)],
         Kind::Views => views(methods, cells, setting),
-        Kind::Generalization => generalization(methods, cells, setting),
-        Kind::Ablation => ablation(methods, cells, setting),
-        Kind::Mesh | Kind::Efficiency => mesh(methods, cells, setting),
+        Kind::Generalization => vec![generalization(methods, cells, setting)],
+        Kind::Ablation => vec![ablation(methods, cells, setting)],
+        Kind::Mesh | Kind::Efficiency => vec![mesh(methods, cells, setting)],
     };
-    let notes = notes(methods, cells, setting);
     Table {
-        markdown: format!("{body}\n{}", notes.join("\n") + "\n"),
-        json: json!({
-            "table": format!("{kind:?}").to_lowercase(),
-            "notes": notes,
-            "cells": cells,
-        }),
+        kind: kind.name(),
+        grids,
+        notes: notes(methods, cells, setting),
+        cells: json!(cells),
     }
-}
-
-/// Rows of a Markdown table under a head.
-pub fn rows(head: &[&str], rows: &[Vec<String>]) -> String {
-    let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
-    let head: Vec<String> = head.iter().map(|cell| (*cell).to_owned()).collect();
-    let rule = format!("|{}\n", "---|".repeat(head.len()));
-    let body: String = rows.iter().map(|row| line(row)).collect();
-    line(&head) + &rule + &body
 }
 
 /// The means of a method with a number of views over all scans that `chosen` takes.
@@ -93,7 +99,7 @@ fn share(value: f64) -> String {
     format!("{value:.3}")
 }
 
-fn mesh(methods: &[Method], cells: &[Cell], setting: &Setting) -> String {
+fn mesh(methods: &[Method], cells: &[Cell], setting: &Setting) -> Grid {
     let head = [
         "",
         "Acc (m)",
@@ -111,13 +117,13 @@ fn mesh(methods: &[Method], cells: &[Cell], setting: &Setting) -> String {
         row.push(format!("{:.1}", means.seconds));
         row
     };
-    rows(
+    Grid::new(
         &head,
-        &each(methods, cells, setting, head.len() - 1, figures),
+        each(methods, cells, setting, head.len() - 1, figures),
     )
 }
 
-fn depth(methods: &[Method], cells: &[Cell], setting: &Setting) -> String {
+fn depth(methods: &[Method], cells: &[Cell], setting: &Setting) -> Grid {
     let head = [
         "",
         "Abs Rel",
@@ -144,16 +150,16 @@ fn depth(methods: &[Method], cells: &[Cell], setting: &Setting) -> String {
         .map(share)
         .to_vec(),
     };
-    rows(
+    Grid::new(
         &head,
-        &each(methods, cells, setting, head.len() - 1, figures),
+        each(methods, cells, setting, head.len() - 1, figures),
     )
 }
 
-fn views(methods: &[Method], cells: &[Cell], setting: &Setting) -> String {
-    let quality = rows(
+fn views(methods: &[Method], cells: &[Cell], setting: &Setting) -> Vec<Grid> {
+    let quality = Grid::new(
         &["", "Prec", "Recall", "F", "keyframes"],
-        &each(methods, cells, setting, 4, |means| {
+        each(methods, cells, setting, 4, |means| {
             let [.., precision, recall, f] = means.surface;
             let mut row = [precision, recall, f].map(share).to_vec();
             row.push(format!("{:.0}", means.keyframes));
@@ -198,10 +204,9 @@ fn views(methods: &[Method], cells: &[Cell], setting: &Setting) -> String {
         "MaxDrop (%)",
         "SI",
     ];
-    format!(
-        "{quality}\nStability over {list} views:\n\n{}",
-        rows(&head, &steady)
-    )
+    let mut steady = Grid::new(&head, steady);
+    steady.title = Some(format!("Stability over {list} views"));
+    vec![quality, steady]
 }
 
 /// The paper's numbers of views, as far as they were measured; all if they were not.
@@ -216,7 +221,7 @@ fn steady_counts(setting: &Setting) -> Vec<usize> {
     if papers.len() > 1 { papers } else { all }
 }
 
-fn generalization(methods: &[Method], cells: &[Cell], setting: &Setting) -> String {
+fn generalization(methods: &[Method], cells: &[Cell], setting: &Setting) -> Grid {
     let mut sets: Vec<&str> = cells.iter().map(|cell| cell.set.as_str()).collect();
     sets.dedup();
     let mut found = Vec::new();
@@ -236,10 +241,10 @@ fn generalization(methods: &[Method], cells: &[Cell], setting: &Setting) -> Stri
             }
         }
     }
-    rows(&["set", "", "Prec", "Recall", "F", "meshes"], &found)
+    Grid::new(&["set", "", "Prec", "Recall", "F", "meshes"], found)
 }
 
-fn ablation(methods: &[Method], cells: &[Cell], setting: &Setting) -> String {
+fn ablation(methods: &[Method], cells: &[Cell], setting: &Setting) -> Grid {
     let mut found = Vec::new();
     for method in methods {
         for &views in &setting.views {
@@ -266,7 +271,7 @@ fn ablation(methods: &[Method], cells: &[Cell], setting: &Setting) -> String {
     let head = [
         "", "PCE", "ACM", "IPSD", "matching", "guide", "Prec", "Recall", "F",
     ];
-    rows(&head, &found)
+    Grid::new(&head, found)
 }
 
 /// What must be known to read the figures.

@@ -2,7 +2,8 @@
 
 use super::{
     figures::{Cell, Figures},
-    method::{Made, Method},
+    method::Method,
+    report::{Judged, Report},
     scans::Set,
 };
 use crate::{
@@ -40,42 +41,39 @@ pub struct Setting {
     pub limits: Limits,
 }
 
-/// One cell for each scan, number of views, method and seed. A method that fails on a scan is a cell that says why.
-pub fn all(sets: &[Set], methods: &[Method], setting: &Setting) -> Result<Vec<Cell>, Failure> {
-    let scans = sets.iter().map(|set| set.scans.len()).sum::<usize>();
-    let there: Vec<&Method> = methods.iter().filter(|method| method.is_there()).collect();
-    let bar = bar("measuring", scans * there.len() * setting.views.len());
+/// One cell for each scan, number of views, method and seed. A method that fails on a scan is a cell that says why. The
+/// report gets the meshes of the first seed and the last number of views.
+pub fn all(
+    sets: &[Set],
+    methods: &[Method],
+    setting: &Setting,
+    mut report: Option<&mut Report>,
+) -> Result<Vec<Cell>, Failure> {
+    let methods: Vec<&Method> = methods.iter().filter(|method| method.is_there()).collect();
+    let scans: usize = sets.iter().map(|set| set.scans.len()).sum();
+    let bar = bar("measuring", scans * methods.len() * setting.views.len());
     let mut cells = Vec::new();
-    for (set, path) in sets
-        .iter()
-        .flat_map(|set| set.scans.iter().map(move |path| (set, path)))
-    {
-        let scan = open_scan(path)?;
-        let name = path
-            .file_stem()
-            .unwrap_or(path.as_os_str())
-            .to_string_lossy();
-        let truth = truth(&scan, path, &name, setting)?;
-        for &views in &setting.views {
-            for method in &there {
-                // What no chance is in gives the same with every seed.
-                let seeds = match (method.as_network(), setting.seeds) {
-                    (Some(_), Some(seeds)) => seeds,
-                    _ => 1,
-                };
-                for seed in 0..seeds {
-                    let figures = method.mesh(&scan, views, seed, setting);
-                    let figures = figures.and_then(|made| judge(made, &truth, &scan, setting));
-                    cells.extend(figures.transpose().map(|figures| Cell {
-                        set: set.name.clone(),
-                        scan: name.to_string(),
-                        method: method.name.clone(),
-                        views,
-                        seed,
-                        figures: figures.map_err(|failure| failure.to_string()),
-                    }));
+    for set in sets {
+        for path in &set.scans {
+            let subject = Subject::open(path, setting)?;
+            for &views in &setting.views {
+                let mut shown = report
+                    .as_deref_mut()
+                    .filter(|_| setting.views.last() == Some(&views));
+                for method in &methods {
+                    for seed in 0..setting.seeds_of(method) {
+                        let report = shown.as_deref_mut().filter(|_| seed == 0);
+                        cells.push(Cell {
+                            set: set.name.clone(),
+                            scan: subject.name.clone(),
+                            method: method.name.clone(),
+                            views,
+                            seed,
+                            figures: subject.figures(method, views, seed, setting, report)?,
+                        });
+                    }
+                    bar.inc(1);
                 }
-                bar.inc(1);
             }
         }
     }
@@ -83,43 +81,82 @@ pub fn all(sets: &[Set], methods: &[Method], setting: &Setting) -> Result<Vec<Ce
     Ok(cells)
 }
 
-/// The true mesh of a scan in its own world: a file that was named for it or lies in it, or fused from all of its depth.
-fn truth(scan: &Scan, path: &Path, name: &str, setting: &Setting) -> Result<Mesh, Failure> {
-    if let Some(folder) = &setting.truth {
-        return read_mesh(&folder.join(format!("{name}.ply")));
+impl Setting {
+    /// How many there are; one where there is no chance in it.
+    fn seeds_of(&self, method: &Method) -> u64 {
+        match (method.as_network(), self.seeds) {
+            (Some(_), Some(seeds)) => seeds,
+            _ => 1,
+        }
     }
-    let beside = path.join("gt.ply");
-    if beside.is_file() {
-        return read_mesh(&beside);
-    }
-    let made = Method::sensor().mesh(scan, None, 0, setting)?;
-    Ok(made.map(|made| made.mesh).unwrap_or_default())
 }
 
-fn judge(
-    made: Option<Made>,
-    truth: &Mesh,
-    scan: &Scan,
-    setting: &Setting,
-) -> Result<Option<Figures>, Failure> {
-    let Some(made) = made else {
-        return Ok(None);
-    };
-    let report = evaluate::evaluate(
-        &made.mesh,
-        truth,
-        Some(scan),
-        setting.protocol,
-        0,
-        &setting.device,
-        |_, _| {},
-    );
-    let report = pollster::block_on(report)?;
-    Ok(Some(Figures {
-        surface: report.surface,
-        depth: report.depth,
-        keyframes: made.keyframes,
-        triangles: made.mesh.triangles.len(),
-        seconds: made.seconds,
-    }))
+/// A scan and what is true of it.
+struct Subject {
+    name: String,
+    scan: Scan,
+    truth: Mesh,
+}
+
+impl Subject {
+    /// The true mesh is a file that was named for the scan or lies in it, or is fused from all of its depth.
+    fn open(path: &Path, setting: &Setting) -> Result<Self, Failure> {
+        let scan = open_scan(path)?;
+        let name = path
+            .file_stem()
+            .unwrap_or(path.as_os_str())
+            .to_string_lossy();
+        let beside = path.join("gt.ply");
+        let truth = match &setting.truth {
+            Some(folder) => read_mesh(&folder.join(format!("{name}.ply")))?,
+            None if beside.is_file() => read_mesh(&beside)?,
+            None => Method::sensor().mesh(&scan, None, 0, setting)?.mesh,
+        };
+        Ok(Self {
+            name: name.into_owned(),
+            scan,
+            truth,
+        })
+    }
+
+    /// Makes a mesh and judges it; gives in words why there is none.
+    fn figures(
+        &self,
+        method: &Method,
+        views: Option<usize>,
+        seed: u64,
+        setting: &Setting,
+        report: Option<&mut Report>,
+    ) -> Result<Result<Figures, String>, Failure> {
+        let made = match method.mesh(&self.scan, views, seed, setting) {
+            Ok(made) => made,
+            Err(failure) => return Ok(Err(failure.to_string())),
+        };
+        if let Some(report) = report {
+            report.add(&Judged {
+                scan: &self.name,
+                method: &method.name,
+                mesh: &made.mesh,
+                truth: &self.truth,
+                up: recon::up(&self.scan),
+            })?;
+        }
+        let judged = evaluate::evaluate(
+            &made.mesh,
+            &self.truth,
+            Some(&self.scan),
+            setting.protocol,
+            0,
+            &setting.device,
+            |_, _| {},
+        );
+        let judged = pollster::block_on(judged)?;
+        Ok(Ok(Figures {
+            surface: judged.surface,
+            depth: judged.depth,
+            keyframes: made.keyframes,
+            triangles: made.mesh.triangles.len(),
+            seconds: made.seconds,
+        }))
+    }
 }

@@ -101,7 +101,7 @@ impl Method {
         self.as_network().map(Ipdrecon::config)
     }
 
-    /// The mesh of a scan from at most `views` keyframes. `None` for a row that is not there.
+    /// The mesh of a scan from at most `views` keyframes.
     ///
     /// # Errors
     /// What the run says.
@@ -111,10 +111,10 @@ impl Method {
         views: Option<usize>,
         seed: u64,
         setting: &Setting,
-    ) -> Result<Option<Made>, Failure> {
+    ) -> Result<Made, Failure> {
         let started = Instant::now();
         let depth = match &self.source {
-            Source::Missing => return Ok(None),
+            Source::Missing => return Err(Failure::NoWeights),
             Source::Sensor => DepthSource::Sensor,
             Source::Stereo => DepthSource::Stereo(StereoConfig::default()),
             Source::Network(network) => {
@@ -144,11 +144,11 @@ impl Method {
             });
         }
         recon::place(&mut mesh, scan, false);
-        Ok(Some(Made {
+        Ok(Made {
             mesh,
             keyframes: plan.keyframes.len(),
             seconds: started.elapsed().as_secs_f64(),
-        }))
+        })
     }
 }
 
