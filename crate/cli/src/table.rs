@@ -35,7 +35,7 @@ pub struct Arguments {
     /// The weights of the row "baseline": the network trained alike with all of its switches off.
     #[arg(long, value_name = "FILE")]
     baseline: Option<PathBuf>,
-    /// Weights of one more row.
+    /// Weights of one more row; or a mesh (.ply, in the canonical world) that is the same guess for every scan.
     #[arg(long, value_name = "NAME=FILE")]
     row: Vec<String>,
     /// Take at most this many keyframes of a scan, evenly spread, for every row; several for `views`, such as 60,80,100.
@@ -178,7 +178,7 @@ impl Arguments {
         }
         let methods = rows.into_iter().map(|(name, file)| match file {
             None => Ok(Method::missing(name)),
-            Some(file) => Method::network(name, &file, device),
+            Some(file) => Method::from_file(name, &file, device),
         });
         methods.collect()
     }

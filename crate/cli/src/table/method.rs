@@ -1,7 +1,7 @@
 //! The rows of a table: ways from a scan to a mesh.
 
 use super::measure::Setting;
-use crate::failure::Failure;
+use crate::{failure::Failure, files::read_mesh};
 use burn::tensor::Device;
 use mesh::Mesh;
 use net::{Ipdrecon, NetConfig, weights};
@@ -22,6 +22,8 @@ enum Source {
     Sensor,
     Stereo,
     Network(Box<Ipdrecon>),
+    /// The same mesh for every scan, in the canonical world: what can be had without looking.
+    Guess(Box<Mesh>),
     /// A row that the table has and nobody gave weights for.
     Missing,
 }
@@ -65,6 +67,18 @@ impl Method {
             name,
             source: Source::Missing,
         }
+    }
+
+    /// What a file makes: a mesh (.ply) the same guess for every scan, weights a network.
+    ///
+    /// # Errors
+    /// A file that is neither.
+    pub fn from_file(name: String, path: &Path, device: &Device) -> Result<Self, Failure> {
+        if path.extension().is_some_and(|ending| ending == "ply") {
+            let source = Source::Guess(Box::new(read_mesh(path)?));
+            return Ok(Self { name, source });
+        }
+        Self::network(name, path, device)
     }
 
     /// A network with the weights of a file.
@@ -115,6 +129,15 @@ impl Method {
         let started = Instant::now();
         let depth = match &self.source {
             Source::Missing => return Err(Failure::NoWeights),
+            Source::Guess(mesh) => {
+                let mut mesh = mesh.as_ref().clone();
+                recon::place(&mut mesh, scan, false);
+                return Ok(Made {
+                    mesh,
+                    keyframes: 0,
+                    seconds: 0.0,
+                });
+            }
             Source::Sensor => DepthSource::Sensor,
             Source::Stereo => DepthSource::Stereo(StereoConfig::default()),
             Source::Network(network) => {
