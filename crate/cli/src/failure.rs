@@ -69,6 +69,17 @@ pub enum Failure {
         /// What is wrong with it.
         error: Box<net::weights::WeightsError>,
     },
+    /// A file that PyTorch did not write.
+    #[error("{}: expected a checkpoint that torch.save wrote: {error}; copy it again, or save its state_dict anew", path.display())]
+    Checkpoint {
+        /// Which file.
+        path: PathBuf,
+        /// What is wrong with it.
+        error: String,
+    },
+    /// A checkpoint of another network.
+    #[error(transparent)]
+    Import(#[from] net::weights::vortx::ImportError),
     /// The run went well, and there is no surface.
     #[error(
         "expected a surface, found none from {keyframes} keyframes, and no mesh is written; `ipdrecon doctor` looks into the scan for what may be wrong"

@@ -7,6 +7,7 @@ mod eval;
 mod failure;
 mod files;
 mod fuse;
+mod import;
 mod job;
 mod progress;
 mod reconstruct;
@@ -44,6 +45,8 @@ enum Command {
     Doctor(doctor::Arguments),
     /// Make scans of made-up rooms, with exact depth, to learn from.
     Synth(synth::Arguments),
+    /// Make weights of a checkpoint of VoRTX's own code.
+    Import(import::Arguments),
     /// Train the network on scans with depth.
     Train(train::Arguments),
 }
@@ -57,6 +60,7 @@ fn main() -> ExitCode {
         Command::Table(arguments) => table::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Synth(arguments) => synth::run(&arguments),
+        Command::Import(arguments) => import::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),
     };
     match result {

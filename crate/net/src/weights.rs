@@ -1,5 +1,7 @@
 //! Weights as files: safetensors in 16 or 32 bit, with the configuration and the format's version in the header.
 
+pub mod vortx;
+
 use std::collections::{HashMap, HashSet};
 
 use burn::tensor::Device;
