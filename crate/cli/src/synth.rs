@@ -31,6 +31,9 @@ pub struct Arguments {
     /// Depth with the noise and the reach of a sensor instead of exact depth.
     #[arg(long)]
     noisy_depth: bool,
+    /// Poses as a tracker tells them, off by millimetres and tenths of a degree, instead of exact ones.
+    #[arg(long)]
+    noisy_poses: bool,
     /// What casts the rays: a graphics card where there is one, or else the processor.
     #[arg(long, value_enum, default_value_t = Caster::Auto)]
     device: Caster,
@@ -139,7 +142,8 @@ fn write_room(
         let path = part.join(name);
         fs::write(&path, bytes).map_err(|error| Failure::file("write", &path, error))
     };
-    for (name, text) in scan.texts() {
+    let tracked = arguments.noisy_poses.then(|| scan.tracked());
+    for (name, text) in scan.texts(tracked.as_deref().unwrap_or(scan.views())) {
         write(&name, text.as_bytes())?;
     }
     let write_frame = |i: usize, frame: Frame| {

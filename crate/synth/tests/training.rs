@@ -145,7 +145,11 @@ fn depth_ends_on_the_surface() {
 fn a_seed_is_the_same_scan_again_and_seeds_differ() {
     let picture = |seed, frames| {
         let scan = TrainingScan::new(seed, frames, SIZE[0], SIZE[1]);
-        (scan.frame(3), scan.views().to_vec(), scan.texts())
+        (
+            scan.frame(3),
+            scan.views().to_vec(),
+            scan.texts(scan.views()),
+        )
     };
     assert_eq!(picture(5, 8), picture(5, 8));
     assert_ne!(picture(5, 8).0, picture(6, 8).0);
@@ -185,4 +189,40 @@ fn scans_differ_as_cameras_do() {
             scan.room().floor_m2()
         );
     }
+}
+
+#[test]
+fn tracked_poses_are_off_by_what_a_phone_is() {
+    let mut all = Vec::new();
+    for seed in 0..6 {
+        let scan = TrainingScan::new(seed, 24, 64, 48);
+        let tracked = scan.tracked();
+        assert_eq!(tracked.len(), scan.views().len());
+        let mut offs = Vec::new();
+        for (told, view) in tracked.iter().zip(scan.views()) {
+            assert_eq!(told.camera, view.camera);
+            let off = told.position_m - view.position_m;
+            let turned = told.rotation * view.rotation.transpose();
+            // The trace of a rotation by an angle is 1 + 2 cos.
+            let trace = turned.x_axis.x + turned.y_axis.y + turned.z_axis.z;
+            let angle = (0.5 * (trace - 1.0)).clamp(-1.0, 1.0).acos().to_degrees();
+            assert!((turned.determinant() - 1.0).abs() < 1e-4);
+            assert!(off.length() < 0.06 && angle < 2.0, "{off}, {angle} degrees");
+            offs.push(off);
+        }
+        let mean = offs.iter().map(|off| off.length()).sum::<f32>() / offs.len() as f32;
+        assert!((0.002..0.03).contains(&mean), "seed {seed}: {mean} m");
+        all.push(mean);
+        // The same whenever it is asked for.
+        assert_eq!(tracked, scan.tracked());
+        // Half of it goes with the frame before.
+        let along: f32 = offs.windows(2).map(|two| two[0].dot(two[1])).sum();
+        let squares: f32 = offs.iter().map(|off| off.length_squared()).sum();
+        assert!(
+            along > 0.1 * squares && along < 0.9 * squares,
+            "seed {seed}: {along} of {squares}"
+        );
+    }
+    all.sort_by(f32::total_cmp);
+    assert!(all[5] > 1.5 * all[0], "scans differ: {all:?}");
 }

@@ -1,6 +1,6 @@
 //! A walk through a training room, as the files of a scan.
 
-use glam::Vec3;
+use glam::{Mat3, Quat, Vec3};
 
 use crate::layout::{Content, seven_scenes_upright};
 use crate::path::View;
@@ -120,9 +120,41 @@ impl TrainingScan {
         depth_m.iter().enumerate().map(noisy).collect()
     }
 
-    /// The scan's text files in the 7-Scenes layout, calibration and poses, by name.
-    pub fn texts(&self) -> Vec<(String, String)> {
-        seven_scenes_upright(&self.views)
+    /// The views as a tracker would tell them: off by up to some 15 mm and half a degree, a scan more than another; half of
+    /// that changes slowly over the walk, half from frame to frame.
+    pub fn tracked(&self) -> Vec<View> {
+        const KNOT: usize = 12;
+        let seed = self.seed as u32 ^ 0x70A5;
+        // Nearly a normal distribution of deviation 1.
+        let bell = |at: usize, k: i32| {
+            let draw = |part: i32| hash_unit(at as i32, k, part, seed);
+            2.0 * (draw(0) + draw(1) + draw(2)) - 3.0
+        };
+        let [shift_m, turn] = [
+            0.002 + 0.008 * hash_unit(0, 0, 7, seed),
+            0.001 + 0.004 * hash_unit(0, 0, 8, seed),
+        ];
+        let off = |frame: usize, k: i32| {
+            let share = (frame % KNOT) as f32 / KNOT as f32;
+            let [from, to] = [frame / KNOT, frame / KNOT + 1].map(|knot| bell(knot, k));
+            0.7 * (from + share * (to - from)) + 0.7 * bell(frame, k + 6)
+        };
+        let vector =
+            |frame: usize, k: i32| Vec3::new(off(frame, k), off(frame, k + 1), off(frame, k + 2));
+        let told = |(frame, view): (usize, &View)| {
+            let turned = Quat::from_scaled_axis(turn * vector(frame, 3));
+            View {
+                rotation: Mat3::from_quat(turned) * view.rotation,
+                position_m: view.position_m + shift_m * vector(frame, 0),
+                ..*view
+            }
+        };
+        self.views.iter().enumerate().map(told).collect()
+    }
+
+    /// The scan's text files in the 7-Scenes layout, calibration and poses of `views`, by name.
+    pub fn texts(&self, views: &[View]) -> Vec<(String, String)> {
+        seven_scenes_upright(views)
             .into_iter()
             .filter_map(|(name, content)| match content {
                 Content::Text(text) => Some((name, text)),
