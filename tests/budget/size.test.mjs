@@ -1,6 +1,6 @@
-// What a visitor downloads: the engine and our own JavaScript stay within their budgets.
+// What a visitor downloads: the engine, our own JavaScript and the weights stay within their budgets.
 import assert from 'node:assert/strict';
-import { readFileSync, readdirSync } from 'node:fs';
+import { readFileSync, readdirSync, statSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import { brotliCompressSync, constants, gzipSync } from 'node:zlib';
@@ -8,6 +8,7 @@ import { root } from '../../tools/run.mjs';
 
 const ENGINE_BYTES = 2_500_000;
 const SCRIPT_BYTES = 40_000;
+const WEIGHTS_BYTES = 14_000_000;
 
 test('the engine is at most 2.5 MB in brotli-11', (t) => {
   const wasm = readFileSync(join(root, 'www/dist/ipdrecon/engine_bg.wasm'));
@@ -24,4 +25,13 @@ test('our own JavaScript is at most 40 kB in gzip', (t) => {
   const bytes = scripts.map((name) => gzipSync(readFileSync(join(dist, name)), { level: 9 }).length).reduce((a, b) => a + b);
   t.diagnostic(`own scripts: ${bytes} bytes in gzip, ${scripts.length} files`);
   assert.ok(bytes <= SCRIPT_BYTES, `${bytes} bytes, at most ${SCRIPT_BYTES} expected`);
+});
+
+test('one file of weights is released, of at most 14 MB', (t) => {
+  const folder = join(root, 'weights');
+  const files = readdirSync(folder).filter((name) => name.endsWith('.safetensors'));
+  assert.deepEqual(files, ['ipdrecon.safetensors']);
+  const bytes = statSync(join(folder, files[0])).size;
+  t.diagnostic(`weights: ${bytes} bytes`);
+  assert.ok(bytes <= WEIGHTS_BYTES, `${bytes} bytes, at most ${WEIGHTS_BYTES} expected`);
 });

@@ -38,11 +38,8 @@ pub enum Failure {
         /// Name of the scan.
         name: String,
     },
-    /// The network was asked for without its weights.
-    #[error(
-        "expected --weights FILE, found none: no trained network comes with this program yet; train one with `ipdrecon train`, \
-         or run `ipdrecon stereo`, which needs none"
-    )]
+    /// A row of a table that nobody gave weights for.
+    #[error("expected weights of the row, found none; name a file")]
     NoWeights,
     /// A table of nothing.
     #[error(

@@ -1,18 +1,25 @@
-//! `ipdrecon import`: a checkpoint of VoRTX's own code that a user owns, as weights of this program.
+//! `ipdrecon import`: weights made ready for release, and a checkpoint of VoRTX's own code that a user owns.
 
-use crate::failure::Failure;
+use crate::{failure::Failure, weights::Weights};
 use burn::tensor::Device;
 use clap::Args;
-use net::weights::{Precision, save, vortx};
+use net::{
+    Ipdrecon,
+    weights::{self, Precision, save},
+};
 use pytorch_reader::{DType, PytorchReader, Tensor};
-use std::{fs, path::PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 /// What `import` is told.
 #[derive(Args)]
 pub struct Arguments {
-    /// The checkpoint of VoRTX: a file of `torch.save`, with the weights alone or under `state_dict`.
+    /// Weights of `ipdrecon train`; or a checkpoint of VoRTX: a file of `torch.save`, with the weights alone or under
+    /// `state_dict`.
     checkpoint: PathBuf,
-    /// The weights to write (.safetensors).
+    /// The weights to write (.safetensors), in 16 bits.
     #[arg(short, long)]
     output: PathBuf,
 }
@@ -20,8 +27,28 @@ pub struct Arguments {
 /// Runs `import`.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.checkpoint;
-    let unreadable = |error: String| Failure::Checkpoint {
+    let network = if path
+        .extension()
+        .is_some_and(|ending| ending == "safetensors")
+    {
+        Weights::read(Some(path))?.get(|bytes| weights::load(bytes, &Device::flex()))?
+    } else {
+        vortx(path)?
+    };
+    let bytes = save(&network, Precision::F16).map_err(|error| Failure::Weights {
         path: path.clone(),
+        error: Box::new(error),
+    })?;
+    fs::write(&arguments.output, &bytes)
+        .map_err(|error| Failure::file("write", &arguments.output, error))?;
+    eprintln!("{}: {} bytes", arguments.output.display(), bytes.len());
+    Ok(())
+}
+
+/// The network of a file of `torch.save`.
+fn vortx(path: &Path) -> Result<Ipdrecon, Failure> {
+    let unreadable = |error: String| Failure::Checkpoint {
+        path: path.to_owned(),
         error,
     };
     fs::metadata(path).map_err(|error| Failure::file("read", path, error))?;
@@ -40,23 +67,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             }
         }
     };
-    let network = vortx::import(read, reader.len(), &Device::flex());
-    if let Some(error) = fault {
-        return Err(unreadable(error));
+    let network = net::weights::vortx::import(read, reader.len(), &Device::flex());
+    match fault {
+        Some(error) => Err(unreadable(error)),
+        None => Ok(network?),
     }
-    let weights = |error| Failure::Weights {
-        path: path.clone(),
-        error: Box::new(error),
-    };
-    let bytes = save(&network?, Precision::F16).map_err(weights)?;
-    fs::write(&arguments.output, bytes)
-        .map_err(|error| Failure::file("write", &arguments.output, error))?;
-    eprintln!(
-        "{}: VoRTX's network, {} tensors read",
-        arguments.output.display(),
-        reader.len()
-    );
-    Ok(())
 }
 
 fn numbers(tensor: &Tensor) -> Result<Vec<f32>, String> {

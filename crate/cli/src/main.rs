@@ -16,6 +16,7 @@ mod stereo;
 mod synth;
 mod table;
 mod train;
+mod weights;
 
 use clap::{Parser, Subcommand};
 use failure::Failure;

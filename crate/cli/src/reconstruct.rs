@@ -5,18 +5,20 @@ use crate::{
     job::{Job, Opened},
     progress::Terminal,
     size::Size,
+    weights::Weights,
 };
 use clap::{Args, ValueEnum};
 use net::{Ipdrecon, weights};
 use recon::{DepthSource, NetworkConfig, Options, Preset, ViewChoice};
-use std::{fs, path::PathBuf};
+use std::path::PathBuf;
 
 /// What `reconstruct` is told.
 #[derive(Args)]
 pub struct Arguments {
     #[command(flatten)]
     job: Job,
-    /// Trained weights, as `ipdrecon train` writes them (safetensors with the configuration inside).
+    /// Trained weights, as `ipdrecon train` writes them (safetensors with the configuration inside); without it those that
+    /// come with the program.
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Settings that go together; without it those that suit the weights.
@@ -62,16 +64,11 @@ enum Choice {
 
 /// Runs `reconstruct`.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let path = arguments.weights.as_ref().ok_or(Failure::NoWeights)?;
-    let bytes = fs::read(path).map_err(|error| Failure::file("read", path, error))?;
-    let failed = |error| Failure::Weights {
-        path: path.clone(),
-        error: Box::new(error),
-    };
+    let file = Weights::read(arguments.weights.as_deref())?;
     // Before the scan is opened: that may take long.
-    let preset = arguments.preset(&weights::config(&bytes).map_err(failed)?);
+    let preset = arguments.preset(&file.get(weights::config)?);
     let opened = arguments.job.open()?;
-    let network = weights::load(&bytes, &opened.device).map_err(failed)?;
+    let network = file.get(|bytes| weights::load(bytes, &opened.device))?;
     arguments.reconstruct(&opened, &network, preset)
 }
 

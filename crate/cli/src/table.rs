@@ -9,15 +9,20 @@ mod method;
 mod picture;
 mod report;
 mod scans;
+mod setting;
 
 use crate::{compute::DeviceChoice, failure::Failure, size::Size};
 use clap::{Args, ValueEnum};
-use layout::Table;
-use measure::Setting;
-use method::{Method, named};
+use layout::{Kind, Table};
+use method::Method;
 use recon::{NetworkConfig, evaluate};
 use report::Report;
-use std::{fs, path::PathBuf};
+use scans::named;
+use setting::Setting;
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 /// What `table` is told.
 #[derive(Args)]
@@ -29,7 +34,7 @@ pub struct Arguments {
     /// lies. For `generalization` each is a set, which NAME=… names.
     #[arg(long, num_args = 1.., value_name = "SCAN")]
     scans: Vec<String>,
-    /// The weights of the row "ours".
+    /// The weights of the row "ours"; without it those that come with the program.
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// The weights of the row "baseline": the network trained alike with all of its switches off.
@@ -71,37 +76,6 @@ pub struct Arguments {
     /// Write every single figure into this file too.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-}
-
-/// The paper's tables.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Kind {
-    /// Table 4: depth that the meshes show to the scan's cameras.
-    Depth,
-    /// Table 3: accuracy, completeness, precision, recall and F of the meshes.
-    Mesh,
-    /// Table 5: how much quality depends on the number of views.
-    Views,
-    /// Table 6: milliseconds of the network's parts.
-    Efficiency,
-    /// Table 7: other sets of scans.
-    Generalization,
-    /// Table 8: what each switch of the network does.
-    Ablation,
-}
-
-impl Kind {
-    /// What it is called.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Depth => "depth",
-            Self::Mesh => "mesh",
-            Self::Views => "views",
-            Self::Efficiency => "efficiency",
-            Self::Generalization => "generalization",
-            Self::Ablation => "ablation",
-        }
-    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -164,9 +138,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 impl Arguments {
     /// The rows that networks make: the baseline, ours, and whatever else was named.
     fn networks(&self, device: &burn::tensor::Device) -> Result<Vec<Method>, Failure> {
-        let mut rows = vec![
-            ("baseline".to_owned(), self.baseline.clone()),
-            ("ours".to_owned(), self.weights.clone()),
+        let mut methods = vec![
+            match &self.baseline {
+                None => Method::missing("baseline".to_owned()),
+                Some(file) => Method::network("baseline".to_owned(), Some(file), device)?,
+            },
+            Method::network("ours".to_owned(), self.weights.as_deref(), device)?,
         ];
         for row in &self.row {
             let (name, file) = named(row).ok_or_else(|| Failure::Named {
@@ -174,13 +151,9 @@ impl Arguments {
                 expected: "NAME=FILE",
                 found: row.clone(),
             })?;
-            rows.push((name.to_owned(), Some(file.into())));
+            methods.push(Method::from_file(name.to_owned(), Path::new(file), device)?);
         }
-        let methods = rows.into_iter().map(|(name, file)| match file {
-            None => Ok(Method::missing(name)),
-            Some(file) => Method::from_file(name, &file, device),
-        });
-        methods.collect()
+        Ok(methods)
     }
 
     fn write(&self, table: &Table) -> Result<(), Failure> {

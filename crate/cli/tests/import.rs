@@ -6,7 +6,7 @@
 mod common;
 
 use burn::tensor::Device;
-use common::{ipdrecon, str, text};
+use common::{ipdrecon, network, str, text};
 use net::{NetConfig, named};
 use std::{collections::HashMap, fs, io::Write, path::Path};
 use tempfile::TempDir;
@@ -304,6 +304,27 @@ fn every_tensor_of_vortx_finds_its_place() {
         "output_layers.medium.kernel",
         4,
     );
+}
+
+#[test]
+fn weights_of_a_training_run_become_half_as_large() {
+    let folder = TempDir::new().unwrap();
+    let [theirs, ours] =
+        ["run.safetensors", "out.safetensors"].map(|name| folder.path().join(name));
+    let model = net::weights::load(&network(false, 1.0), &Device::flex()).unwrap();
+    let whole = net::weights::save(&model, net::weights::Precision::F32).unwrap();
+    fs::write(&theirs, &whole).unwrap();
+    let run = ipdrecon(&["import", str(&theirs), "-o", str(&ours)]);
+    assert!(run.status.success(), "{}", text(&run.stderr));
+    let found = fs::read(&ours).unwrap();
+    assert!(
+        found.len() < whole.len() * 6 / 10,
+        "{} of {}",
+        found.len(),
+        whole.len()
+    );
+    let found = net::weights::load(&found, &Device::flex()).unwrap();
+    assert_eq!(found.config(), model.config());
 }
 
 #[test]

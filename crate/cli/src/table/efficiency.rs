@@ -1,6 +1,10 @@
 //! The paper's Table 6: what a picture and what a piece of a room cost.
 
-use super::{Kind, grid::Grid, layout::Table, method::Method};
+use super::{
+    grid::Grid,
+    layout::{Kind, Table},
+    method::Method,
+};
 use crate::size::Size;
 use burn::tensor::{Device, Tensor, TensorData};
 use glam::{Affine3A, IVec3, Mat3, Vec3};
@@ -97,13 +101,8 @@ fn median_ms(mut run: impl FnMut()) -> f64 {
 
 /// Waits for a tensor by reading one of its numbers.
 fn wait<const D: usize>(tensor: &Tensor<D>) {
-    drop(
-        tensor
-            .clone()
-            .flatten::<1>(0, D - 1)
-            .slice([0..1])
-            .into_data(),
-    );
+    let first = tensor.clone().flatten::<1>(0, D - 1).narrow(0, 0, 1);
+    drop(first.into_data());
 }
 
 /// Cameras on a circle around the piece that look at its middle.

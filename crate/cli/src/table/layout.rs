@@ -1,13 +1,44 @@
 //! What is in which table.
 
 use super::{
-    Kind,
     figures::{Cell, Means, means, steadiness},
     grid::Grid,
-    measure::Setting,
     method::Method,
+    setting::Setting,
 };
+use clap::ValueEnum;
 use serde_json::{Value, json};
+
+/// The paper's tables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Kind {
+    /// Table 4: depth that the meshes show to the scan's cameras.
+    Depth,
+    /// Table 3: accuracy, completeness, precision, recall and F of the meshes.
+    Mesh,
+    /// Table 5: how much quality depends on the number of views.
+    Views,
+    /// Table 6: milliseconds of the network's parts.
+    Efficiency,
+    /// Table 7: other sets of scans.
+    Generalization,
+    /// Table 8: what each switch of the network does.
+    Ablation,
+}
+
+impl Kind {
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Depth => "depth",
+            Self::Mesh => "mesh",
+            Self::Views => "views",
+            Self::Efficiency => "efficiency",
+            Self::Generalization => "generalization",
+            Self::Ablation => "ablation",
+        }
+    }
+}
 
 /// A finished table.
 pub struct Table {

@@ -5,41 +5,17 @@ use super::{
     method::Method,
     report::{Judged, Report},
     scans::Set,
+    setting::Setting,
 };
 use crate::{
     failure::Failure,
     files::{open_scan, read_mesh},
     progress::bar,
 };
-use burn::tensor::Device;
 use mesh::Mesh;
-use recon::{Limits, evaluate};
+use recon::evaluate;
 use scan::Scan;
-use std::path::{Path, PathBuf};
-
-/// What all cells share.
-pub struct Setting {
-    /// The most keyframes; `None` for all.
-    pub views: Vec<Option<usize>>,
-    /// The most views of a tile.
-    pub tile_views: Option<usize>,
-    /// Random choice of a tile's views with the seeds below this.
-    pub seeds: Option<u64>,
-    /// How meshes are compared.
-    pub protocol: evaluate::Protocol,
-    /// Where true meshes lie.
-    pub truth: Option<PathBuf>,
-    /// How far depth counts, in metres.
-    pub reach_m: f32,
-    /// The most pixels of a picture.
-    pub size: Option<(u32, u32)>,
-    /// Where to compute.
-    pub device: Device,
-    /// That in words.
-    pub device_name: String,
-    /// What it allows.
-    pub limits: Limits,
-}
+use std::path::Path;
 
 /// One cell for each scan, number of views, method and seed. A method that fails on a scan is a cell that says why. The
 /// report gets the meshes of the first seed and the last number of views.
@@ -61,7 +37,7 @@ pub fn all(
                     .as_deref_mut()
                     .filter(|_| setting.views.last() == Some(&views));
                 for method in &methods {
-                    for seed in 0..setting.seeds_of(method) {
+                    for seed in 0..seeds(method, setting) {
                         let report = shown.as_deref_mut().filter(|_| seed == 0);
                         cells.push(Cell {
                             set: set.name.clone(),
@@ -81,13 +57,11 @@ pub fn all(
     Ok(cells)
 }
 
-impl Setting {
-    /// How many there are; one where there is no chance in it.
-    fn seeds_of(&self, method: &Method) -> u64 {
-        match (method.as_network(), self.seeds) {
-            (Some(_), Some(seeds)) => seeds,
-            _ => 1,
-        }
+/// How many seeds a method is tried with; one where there is no chance in it.
+fn seeds(method: &Method, setting: &Setting) -> u64 {
+    match (method.as_network(), setting.seeds) {
+        (Some(_), Some(seeds)) => seeds,
+        _ => 1,
     }
 }
 

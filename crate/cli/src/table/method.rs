@@ -1,13 +1,13 @@
 //! The rows of a table: ways from a scan to a mesh.
 
-use super::measure::Setting;
-use crate::{failure::Failure, files::read_mesh};
+use super::setting::Setting;
+use crate::{failure::Failure, files::read_mesh, weights::Weights};
 use burn::tensor::Device;
 use mesh::Mesh;
 use net::{Ipdrecon, NetConfig, weights};
 use recon::{DepthSource, Flow, NetworkConfig, Options, Preset, Sink, ViewChoice};
 use scan::Scan;
-use std::{fs, path::Path, time::Instant};
+use std::{path::Path, time::Instant};
 use stereo::StereoConfig;
 
 /// A way to make a mesh.
@@ -36,12 +36,6 @@ pub struct Made {
     pub keyframes: usize,
     /// Seconds from the scan to the mesh.
     pub seconds: f64,
-}
-
-/// `NAME=REST` in its two halves.
-pub fn named(text: &str) -> Option<(&str, &str)> {
-    let halves = text.split_once('=')?;
-    (!halves.0.is_empty() && !halves.1.is_empty()).then_some(halves)
 }
 
 impl Method {
@@ -78,19 +72,15 @@ impl Method {
             let source = Source::Guess(Box::new(read_mesh(path)?));
             return Ok(Self { name, source });
         }
-        Self::network(name, path, device)
+        Self::network(name, Some(path), device)
     }
 
-    /// A network with the weights of a file.
+    /// A network with the weights of a file, or with the released ones.
     ///
     /// # Errors
     /// A file that is no weights.
-    pub fn network(name: String, path: &Path, device: &Device) -> Result<Self, Failure> {
-        let bytes = fs::read(path).map_err(|error| Failure::file("read", path, error))?;
-        let network = weights::load(&bytes, device).map_err(|error| Failure::Weights {
-            path: path.to_owned(),
-            error: Box::new(error),
-        })?;
+    pub fn network(name: String, path: Option<&Path>, device: &Device) -> Result<Self, Failure> {
+        let network = Weights::read(path)?.get(|bytes| weights::load(bytes, device))?;
         Ok(Self {
             name,
             source: Source::Network(Box::new(network)),

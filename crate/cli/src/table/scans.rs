@@ -1,6 +1,5 @@
 //! Which scans a table is about.
 
-use super::method::named;
 use crate::failure::Failure;
 use std::path::{Path, PathBuf};
 
@@ -10,6 +9,12 @@ pub struct Set {
     pub name: String,
     /// Folders and zips.
     pub scans: Vec<PathBuf>,
+}
+
+/// `NAME=REST` in its two halves.
+pub fn named(text: &str) -> Option<(&str, &str)> {
+    let halves = text.split_once('=')?;
+    (!halves.0.is_empty() && !halves.1.is_empty()).then_some(halves)
 }
 
 /// The sets that the arguments name.

@@ -206,7 +206,7 @@ fn convolution(first: usize, rest: &[&str]) -> Option<String> {
     }
 }
 
-fn normalisation<'a>(part: &'a str) -> Option<&'a str> {
+fn normalisation(part: &str) -> Option<&str> {
     match part {
         "gamma" => Some("weight"),
         "beta" => Some("bias"),

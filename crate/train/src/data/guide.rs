@@ -1,8 +1,7 @@
 //! Stereo's depth of a scan's keyframes, for networks with the switch `guide`.
 
 use super::crop::Crop;
-use super::picture::{mirror, pinhole};
-use super::set::single;
+use super::picture::{mirror, pinhole, single};
 use crate::random::Random;
 use burn::tensor::Device;
 use glam::{Affine3A, Vec3};

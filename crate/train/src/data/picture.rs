@@ -1,6 +1,6 @@
 //! Pictures at the working size, with the cameras that belong to them.
 
-use glam::Vec2;
+use glam::{Affine3A, DAffine3, Vec2};
 use mesh::camera::Pinhole;
 use scan::{Camera, ColorImage, DepthImage};
 
@@ -108,6 +108,11 @@ pub fn pinhole(camera: &Camera) -> Pinhole {
         cx: camera.cx as f32,
         cy: camera.cy as f32,
     }
+}
+
+/// A pose in single precision.
+pub fn single(pose: &DAffine3) -> Affine3A {
+    Affine3A::from_mat3_translation(pose.matrix3.as_mat3(), pose.translation.as_vec3())
 }
 
 /// For each of `count` equal stretches of `[start, start + len)`: the pixels it covers and their shares.

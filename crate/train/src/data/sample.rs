@@ -2,8 +2,8 @@
 
 use super::augment;
 use super::crop::{Crop, CropChance};
-use super::picture::{Fit, mirror};
-use super::set::{ScanSet, single};
+use super::picture::{Fit, mirror, single};
+use super::set::ScanSet;
 use super::views::{self, Sight};
 use super::volume::{TruthVolume, VOXEL_M};
 use crate::error::TrainError;

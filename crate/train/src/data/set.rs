@@ -1,10 +1,10 @@
 //! The scans of a run: their frames in memory, their truth made when first asked for.
 
 use super::guide::StereoMaps;
-use super::picture::pinhole;
+use super::picture::{pinhole, single};
 use super::volume::{Building, DepthView, TruthVolume, VOXEL_M};
 use crate::error::TrainError;
-use glam::{Affine3A, DAffine3, IVec3, Vec2, Vec3};
+use glam::{IVec3, Vec2, Vec3};
 use scan::{FolderSource, Frame, KeyframeRule, Scan, ScanError, ZipSource};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -263,11 +263,6 @@ fn corners(view: &DepthView) -> Vec<Vec3> {
         }
     }
     points
-}
-
-/// A pose in single precision.
-pub(super) fn single(pose: &DAffine3) -> Affine3A {
-    Affine3A::from_mat3_translation(pose.matrix3.as_mat3(), pose.translation.as_vec3())
 }
 
 fn entry(name: &str, scan: &Scan, views: usize) -> Result<ScanEntry, TrainError> {

@@ -1,0 +1,29 @@
+//! What all figures of a table share.
+
+use burn::tensor::Device;
+use recon::{Limits, evaluate};
+use std::path::PathBuf;
+
+/// What all cells share.
+pub struct Setting {
+    /// The most keyframes; `None` for all.
+    pub views: Vec<Option<usize>>,
+    /// The most views of a tile.
+    pub tile_views: Option<usize>,
+    /// Random choice of a tile's views with the seeds below this.
+    pub seeds: Option<u64>,
+    /// How meshes are compared.
+    pub protocol: evaluate::Protocol,
+    /// Where true meshes lie.
+    pub truth: Option<PathBuf>,
+    /// How far depth counts, in metres.
+    pub reach_m: f32,
+    /// The most pixels of a picture.
+    pub size: Option<(u32, u32)>,
+    /// Where to compute.
+    pub device: Device,
+    /// That in words.
+    pub device_name: String,
+    /// What it allows.
+    pub limits: Limits,
+}
