@@ -5,9 +5,10 @@ use crate::{
     failure::Failure,
     files::{open_scan, read_mesh},
     progress::bar,
+    protocol::Protocol,
 };
 use burn::tensor::Device;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use mesh::metrics::Depth2d;
 use recon::evaluate::{self, DepthFigures, Report, compare_depth, mean_depth};
 use serde_json::json;
@@ -39,14 +40,6 @@ pub struct Arguments {
     json: bool,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum Protocol {
-    Vortx,
-    #[value(name = "transformerfusion")]
-    TransformerFusion,
-    Plain,
-}
-
 /// Runs `eval`.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     match arguments {
@@ -75,17 +68,12 @@ fn judge_mesh(
     let pred = read_mesh(pred)?;
     let gt = read_mesh(gt)?;
     let scan = arguments.scan.as_deref().map(open_scan).transpose()?;
-    let protocol = match protocol {
-        Protocol::Vortx => evaluate::Protocol::Vortx,
-        Protocol::TransformerFusion => evaluate::Protocol::TransformerFusion,
-        Protocol::Plain => evaluate::Protocol::Plain,
-    };
     let bar = bar("comparing", 0);
     let report = pollster::block_on(evaluate::evaluate(
         &pred,
         &gt,
         scan.as_ref(),
-        protocol,
+        protocol.into(),
         arguments.seed,
         &Device::flex(),
         |done, total| {

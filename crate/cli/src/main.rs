@@ -10,6 +10,7 @@ mod fuse;
 mod import;
 mod job;
 mod progress;
+mod protocol;
 mod reconstruct;
 mod size;
 mod stereo;

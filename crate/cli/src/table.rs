@@ -11,11 +11,11 @@ mod report;
 mod scans;
 mod setting;
 
-use crate::{compute::DeviceChoice, failure::Failure, size::Size};
-use clap::{Args, ValueEnum};
+use crate::{compute::DeviceChoice, failure::Failure, protocol::Protocol, size::Size};
+use clap::Args;
 use layout::{Kind, Table};
 use method::Method;
-use recon::{NetworkConfig, evaluate};
+use recon::NetworkConfig;
 use report::Report;
 use scans::named;
 use setting::Setting;
@@ -78,14 +78,6 @@ pub struct Arguments {
     json: Option<PathBuf>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Protocol {
-    Vortx,
-    #[value(name = "transformerfusion")]
-    TransformerFusion,
-    Plain,
-}
-
 /// Runs `table`.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (device, limits) = arguments.device.device()?;
@@ -106,11 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             },
             tile_views: arguments.tile_views,
             seeds: arguments.seeds,
-            protocol: match arguments.protocol {
-                Protocol::Vortx => evaluate::Protocol::Vortx,
-                Protocol::TransformerFusion => evaluate::Protocol::TransformerFusion,
-                Protocol::Plain => evaluate::Protocol::Plain,
-            },
+            protocol: arguments.protocol.into(),
             truth: arguments.truth.clone(),
             reach_m: arguments.reach,
             size: arguments.size.map(|size| size.0),
