@@ -3,7 +3,7 @@
 import { join } from 'node:path';
 import { run, seconds, toolsDir, write } from './run.mjs';
 import { setup } from './setup.mjs';
-import { count, reasons, sum } from './test/count.mjs';
+import { count, failures, reasons, sum } from './test/count.mjs';
 import { lanes } from './test/lanes.mjs';
 
 const limitSeconds = 2400;
@@ -35,7 +35,7 @@ async function lane(name) {
   const total = sum(counts);
   const log = join(toolsDir, 'log', `${name}.log`);
   write(log, output);
-  if (total.failed > 0 && !verbose) console.log(output.split('\n').slice(-400).join('\n').trimEnd());
+  if (total.failed > 0 && !verbose) console.log(failures(output));
   for (const reason of reasons(output)) console.log(`        ${reason}`);
   console.log(`lane    ${name}: ${total.failed > 0 ? 'FAILED' : 'ok'}, ${words(total)} (${seconds(start)})`);
   return { name, total };

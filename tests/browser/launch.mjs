@@ -1,4 +1,5 @@
 // A visitor's browser on the built page: what happened there is recorded, so that a test can ask for it afterwards.
+import assert from 'node:assert/strict';
 import { mkdirSync } from 'node:fs';
 import { join } from 'node:path';
 import { launch } from '../../tools/browser.mjs';
@@ -62,8 +63,15 @@ export class Visitor {
     return this.page.evaluate((type) => window.record.events.filter((event) => event.type === type), type);
   }
 
+  /** Tasks of the page's own thread that took over 50 ms. */
   longTasks() {
     return this.page.evaluate(() => window.record.longTasks);
+  }
+
+  /** In a journey too long to be made again: no long task but for one that a busy machine stretched. */
+  async isSmooth() {
+    const tasks = await this.longTasks();
+    assert.ok(tasks.length <= 1 && tasks.every(({ duration }) => duration < 100), `long tasks: ${JSON.stringify(tasks)}`);
   }
 
   state() {

@@ -58,7 +58,7 @@ for (const { name, frames, limit_s, open } of scans) {
     assert.equal(opened.format, '7-Scenes');
     assert.ok(seconds(brick) < 10, `first brick after ${seconds(brick)} s`);
     assert.ok(seconds(finished) < limit_s, `whole after ${seconds(finished)} s`);
-    assert.deepEqual(await visitor.longTasks(), []);
+    await visitor.isSmooth();
     assert.ok((await visitor.picture()).colours > 100, 'the room is in the picture');
     await page.screenshot({ path: join(pictures, `${name}.png`) });
 

@@ -17,20 +17,32 @@ after(async () => {
   await browser.close();
 });
 
-const noLongTask = async (visitor, what) => assert.deepEqual(await visitor.longTasks(), [], `long tasks during ${what}`);
+/**
+ * Makes a journey that gives its long tasks, until it has none: up to three times. A busy machine stretches a task now
+ * and then; one that is the page's own comes every time.
+ */
+async function withoutLongTasks(journey) {
+  let tasks;
+  for (let attempt = 0; attempt < 3; attempt += 1) {
+    tasks = await journey();
+    if (tasks.length === 0) return;
+  }
+  assert.deepEqual(tasks, [], 'long tasks, three times');
+}
 
-test('no long task from the click on the sample to the exported file', async () => {
+test('no long task from the click on the sample to the exported file', () => withoutLongTasks(async () => {
   const visitor = await browser.open();
   await visitor.until('idle');
   await visitor.forget();
   await visitor.page.click('#sample');
   await visitor.until('finished');
   await visitor.download('[data-format=glb]');
-  await noLongTask(visitor, 'the sample');
+  const tasks = await visitor.longTasks();
   await visitor.close();
-});
+  return tasks;
+}));
 
-test('the view can be turned while the mesh is still growing', async () => {
+test('the view can be turned while the mesh is still growing', () => withoutLongTasks(async () => {
   const visitor = await browser.open({ path: '?sample' });
   const { page } = visitor;
   await visitor.event('bricks');
@@ -53,11 +65,12 @@ test('the view can be turned while the mesh is still growing', async () => {
   assert.equal((await visitor.events('finished')).length, 0, 'the view has moved and come to rest before the run was over');
   assert.ok(turned.description.length > 10);
   await visitor.until('finished');
-  await noLongTask(visitor, 'turning');
+  const tasks = await visitor.longTasks();
   await visitor.close();
-});
+  return tasks;
+}));
 
-test('a folder of 6,000 files is read without a long task', async () => {
+test('a folder of 6,000 files is read without a long task', () => withoutLongTasks(async () => {
   const files = scan(12);
   for (let index = 0; index < 6000; index += 1) files[`other/${String(index % 7)}/note-${index}.txt`] = 'no frame';
   files['.hidden/thing.txt'] = files['other/.DS_Store'] = 'left out';
@@ -67,11 +80,12 @@ test('a folder of 6,000 files is read without a long task', async () => {
   await visitor.forget();
   await visitor.drop(many);
   await visitor.until('planned');
-  await noLongTask(visitor, 'the drop');
+  const tasks = await visitor.longTasks();
   const [opened] = await visitor.events('opened');
   assert.equal(opened.frames, 12);
   await visitor.close();
-});
+  return tasks;
+}));
 
 test('a scan of 5,000 frames is open in seconds', async (t) => {
   const path = put(join(folder, 'long'), scan(5000));

@@ -55,3 +55,16 @@ export function count(kind, { output, code }) {
 
 /** The reasons that skipped tests gave. */
 export const reasons = (text) => [...new Set([...plain(text).matchAll(/^\s*(skipped: .*|.*# SKIP.*|.*\.\.\. skipped .*)$/gm)].map(([, line]) => line.trim()))];
+
+/** Where each kind of test program says what failed and why. */
+const faults = [
+  /^failures:\n\n([\s\S]*?)\n\nfailures:$/gm,
+  /^✖ failing tests:\n([\s\S]*)/gm,
+  /^={60,}\n((?:FAIL|ERROR): [\s\S]*?)(?=\n-{60,}\nRan )/gm,
+];
+
+/** What failed and why, of a program's output; its end where it does not say so in a known way. */
+export function failures(text) {
+  const found = faults.flatMap((fault) => [...plain(text).matchAll(fault)].map(([, said]) => said.trim()));
+  return found.length > 0 ? found.join('\n\n') : plain(text).split('\n').slice(-100).join('\n').trim();
+}

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { count, reasons, sum } from './count.mjs';
+import { count, failures, reasons, sum } from './count.mjs';
 
 const of = (passed, failed, skipped) => ({ passed, failed, skipped });
 
@@ -43,4 +43,18 @@ test('python: failures, errors and skips are taken from the runs', () => {
 
 test('sums', () => {
   assert.deepEqual(sum([of(1, 0, 0), of(2, 3, 4)]), of(3, 3, 4));
+});
+
+test('what failed is found among what passed, in the words of each test program', () => {
+  const cargo = 'successes:\n\n---- a stdout ----\nfine\n\n\nsuccesses:\n    a\n\nfailures:\n\n---- b stdout ----\npanicked: 3 m, not 4 m\n\n\nfailures:\n    b\n\ntest result: FAILED.\n';
+  assert.equal(failures(cargo + cargo), Array(2).fill('---- b stdout ----\npanicked: 3 m, not 4 m').join('\n\n'));
+  assert.equal(failures('✔ a (2ms)\nℹ fail 1\n\n✖ failing tests:\n\ntest at b.mjs:3\n✖ b\n  54 ms\n'), 'test at b.mjs:3\n✖ b\n  54 ms');
+  const line = '-'.repeat(70);
+  assert.equal(failures(`..F\n${'='.repeat(70)}\nFAIL: test_b\n${line}\n1 != 2\n\n${line}\nRan 3 tests`), `FAIL: test_b\n${line}\n1 != 2`);
+});
+
+test('where nothing says what failed, the end is shown', () => {
+  const output = Array.from({ length: 300 }, (_, i) => `line ${i}`).join('\n');
+  assert.ok(failures(`${output}\nerror: could not compile`).endsWith('line 299\nerror: could not compile'));
+  assert.ok(!failures(output).includes('line 199\n'));
 });

@@ -9,6 +9,8 @@ use crate::{
 };
 use burn::tensor::Device;
 use clap::Args;
+use glam::Vec3;
+use mesh::Mesh;
 use recon::{DepthSource, Limits, Options, Outcome, Plan, PlanError};
 use scan::Scan;
 use std::{
@@ -109,13 +111,7 @@ impl Job {
 
     /// Takes the mesh from the volume and writes it, unless there is none.
     pub fn write(&self, opened: &Opened, outcome: &Outcome) -> Result<(), Failure> {
-        let mut mesh = pollster::block_on(outcome.volume.mesh())?;
-        if mesh.triangles.is_empty() {
-            return Err(Failure::NoSurface {
-                keyframes: outcome.frames_fused,
-            });
-        }
-        let up = recon::place(&mut mesh, &opened.scan, self.canonical);
+        let (mesh, up) = surface(outcome, &opened.scan, self.canonical)?;
         opened.format.write(&mesh, up, &self.output)?;
         eprintln!(
             "{}: {} vertices, {} triangles from {} keyframes in {:.1} s",
@@ -127,6 +123,18 @@ impl Job {
         );
         Ok(())
     }
+}
+
+/// The mesh of a run, where exports lie, and which way is up there; a failure where there is none.
+pub fn surface(outcome: &Outcome, scan: &Scan, canonical: bool) -> Result<(Mesh, Vec3), Failure> {
+    let mut mesh = pollster::block_on(outcome.volume.mesh())?;
+    if mesh.triangles.is_empty() {
+        return Err(Failure::NoSurface {
+            keyframes: outcome.frames_fused,
+        });
+    }
+    let up = recon::place(&mut mesh, scan, canonical);
+    Ok((mesh, up))
 }
 
 impl Opened {

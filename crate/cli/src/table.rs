@@ -21,6 +21,7 @@ use scans::named;
 use setting::Setting;
 use std::{
     fs,
+    num::NonZeroUsize,
     path::{Path, PathBuf},
 };
 
@@ -70,6 +71,9 @@ pub struct Arguments {
     /// Where to compute.
     #[arg(long, value_enum, default_value_t = DeviceChoice::Cpu)]
     device: DeviceChoice,
+    /// Work on so many scans at a time. Several are done sooner on a processor, but their seconds say little.
+    #[arg(long, default_value = "1")]
+    jobs: NonZeroUsize,
     /// Write a page into this folder: the table, plots, and every mesh beside the truth, coloured by its errors.
     #[arg(long, value_name = "FOLDER")]
     report: Option<PathBuf>,
@@ -105,6 +109,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             device_name: arguments.device.name(&device),
             device,
             limits,
+            jobs: arguments.jobs,
         };
         let mut methods = vec![Method::sensor(), Method::stereo()];
         methods.extend(networks);

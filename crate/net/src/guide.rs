@@ -1,4 +1,4 @@
-//! Stereo's depth as the 3D network is given it: the switch `guide`.
+//! Stereo's depth at voxels: given to the 3D network with the switch `guide`, and weighed against what it says.
 
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
@@ -8,15 +8,40 @@ use crate::sample::GuideMap;
 /// Voxels of truncation, as in the truth (method 1.8).
 const TRUNCATION: f32 = 3.0;
 
+/// The network's distance counts as much as so many maps that are certain. Chosen on made-up rooms and two real scans, where 3
+/// to 12 were all better than no mean: a network that learnt on small pictures knows surfaces less exactly than stereo
+/// does where many views agree.
+const NETWORK_WEIGHT: f32 = 6.0;
+
+/// What the maps say of a site.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Guidance {
+    /// Signed distance over the truncation distance, positive in free space.
+    pub distance: f32,
+    /// The sum of the maps' confidence; 0 where none says anything.
+    pub weight: f32,
+}
+
+impl Guidance {
+    /// As the 3D network is given it: the weight cut at 1.
+    pub fn channels(self) -> [f32; 2] {
+        [self.distance, self.weight.min(1.0)]
+    }
+
+    /// The mean of the network's distance and this one, by their weights. Both over the same truncation distance.
+    pub fn mean_with(self, network: f32) -> f32 {
+        (NETWORK_WEIGHT * network + self.weight * self.distance) / (NETWORK_WEIGHT + self.weight)
+    }
+}
+
 /// For each site the mean of `clamp((depth - z) / truncation, -1, 1)` over the maps that see it in front of their surface or
-/// at most one truncation (three voxels) behind, weighed by their confidence, and that weight cut at 1. Zeros where no map
-/// says anything.
-pub fn guide_channels(
+/// at most one truncation (three voxels) behind, weighed by their confidence.
+pub fn guide_at(
     sites: &[IVec3],
     voxel_size_m: f32,
     origin_m: Vec3,
     maps: &[GuideMap],
-) -> Vec<[f32; 2]> {
+) -> Vec<Guidance> {
     let truncation = TRUNCATION * voxel_size_m;
     let cameras: Vec<_> = maps
         .iter()
@@ -40,9 +65,10 @@ pub fn guide_channels(
                 }
             }
             if weight > 0.0 {
-                [sum / weight, weight.min(1.0)]
+                let distance = sum / weight;
+                Guidance { distance, weight }
             } else {
-                [0.0; 2]
+                Guidance::default()
             }
         })
         .collect()

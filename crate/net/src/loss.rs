@@ -7,7 +7,7 @@ use glam::{IVec3, Vec3};
 
 use crate::decode::children;
 use crate::fusion::{Pairs, Pooling};
-use crate::guide::guide_channels;
+use crate::guide::{Guidance, guide_at};
 use crate::model::{Decoded, GUIDE_CHANNELS, TSDF_SCALE};
 use crate::sample::Truth;
 use crate::{Ipdrecon, Level, Sample};
@@ -300,9 +300,9 @@ fn guide_of(
     if !model.config().guide || sample.guide.is_empty() {
         return None;
     }
-    let values = guide_channels(sites, level.voxel_size_m(), Vec3::ZERO, &sample.guide);
-    let shape = [sites.len(), GUIDE_CHANNELS];
-    let data = TensorData::new(values.as_flattened().to_vec(), shape);
+    let says = guide_at(sites, level.voxel_size_m(), Vec3::ZERO, &sample.guide);
+    let values = says.into_iter().flat_map(Guidance::channels).collect();
+    let data = TensorData::new(values, [sites.len(), GUIDE_CHANNELS]);
     Some(Tensor::from_data(data, device))
 }
 

@@ -11,7 +11,7 @@ use glam::{Affine3A, IVec3, Mat3, Vec3};
 use mesh::camera::Pinhole;
 use net::View;
 use net::fusion::{Fusion, FusionConfig, PairTensors, Pairs, Pooling};
-use net::guide::guide_channels;
+use net::guide::{Guidance, guide_at};
 use net::ops::rows::sample;
 use net::planes::Plane;
 use net::sample::GuideMap;
@@ -372,12 +372,11 @@ fn the_guide_is_the_mean_of_truncated_distances() {
     };
     let maps = [map(camera, 2.0, 0.2), map(camera, 2.03, 0.6)];
     let site = |z: i32| IVec3::new(0, 0, z);
-    let said = guide_channels(
-        &[site(25), site(49), site(52), site(53), site(60), site(-5)],
-        0.04,
-        Vec3::ZERO,
-        &maps,
-    );
+    let sites = [25, 49, 52, 53, 60, -5].map(site);
+    let said: Vec<[f32; 2]> = guide_at(&sites, 0.04, Vec3::ZERO, &maps)
+        .into_iter()
+        .map(Guidance::channels)
+        .collect();
     let blend = |near: f32, far: f32| (0.2 * near + 0.6 * far) / 0.8;
     let expected = [
         [1.0, 0.8],
@@ -392,10 +391,21 @@ fn the_guide_is_the_mean_of_truncated_distances() {
     assert!(error < 1e-4, "relative error {error}: {said:?}");
     assert!((0.6..=0.8).contains(&said[3][1]));
     let sure = [map(camera, 2.0, 0.9), map(camera, 2.0, 0.9)];
-    let said = guide_channels(&[site(50), IVec3::new(500, 0, 50)], 0.04, Vec3::ZERO, &sure);
+    let said = guide_at(&[site(50), IVec3::new(500, 0, 50)], 0.04, Vec3::ZERO, &sure);
+    let [distance, weight] = said[0].channels();
     assert!(
-        said[0][0].abs() < 1e-4 && said[0][1] == 1.0,
+        distance.abs() < 1e-4 && weight == 1.0,
         "the weight is cut at 1: {said:?}"
     );
-    assert_eq!(said[1], [0.0, 0.0], "no camera sees it");
+    assert_eq!(said[1], Guidance::default(), "no camera sees it");
+}
+
+/// Six certain maps count as much as the network, and none leaves its word as it is.
+#[cfg_attr(target_family = "wasm", wasm_bindgen_test::wasm_bindgen_test)]
+#[cfg_attr(not(target_family = "wasm"), test)]
+fn many_sure_maps_draw_the_network_to_them() {
+    let says = |distance, weight| Guidance { distance, weight };
+    assert_eq!(says(0.0, 0.0).mean_with(-0.3), -0.3);
+    assert!((says(0.5, 6.0).mean_with(-0.3) - 0.1).abs() < 1e-6);
+    assert!((says(0.5, 600.0).mean_with(-0.3) - 0.5).abs() < 0.01);
 }

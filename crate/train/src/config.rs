@@ -150,6 +150,8 @@ pub struct ScheduleConfig {
     pub fine_tune_rate: f64,
     /// Steps over which the rate grows from 0 to its value.
     pub warm_up: u64,
+    /// The first step from which the rate falls, evenly, to 0 at the last step. Without: never.
+    pub rate_falls_from: Option<u64>,
     /// Samples whose gradients make a step.
     #[serde(default = "one")]
     pub batch: usize,
@@ -313,10 +315,14 @@ impl TrainConfig {
     /// The learning rate of step `step`, counted from 0.
     pub fn rate(&self, step: u64) -> f64 {
         let train = &self.train;
+        let left = train.rate_falls_from.map_or(1.0, |from| {
+            let falling = train.steps.saturating_sub(from).max(1);
+            train.steps.saturating_sub(step) as f64 / falling as f64
+        });
         if self.fine_tunes(step) {
-            return train.fine_tune_rate;
+            return train.fine_tune_rate * left.min(1.0);
         }
         let warmed = (step + 1) as f64 / train.warm_up.max(1) as f64;
-        train.rate * warmed.min(1.0)
+        train.rate * warmed.min(left).min(1.0)
     }
 }

@@ -6,7 +6,7 @@ mod common;
 use net::sample::Sample;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use train::TrainError;
 use train::data::{Augment, SampleOptions, Sampler};
 use train::feed::Feed;
@@ -83,7 +83,12 @@ fn no_more_is_made_ahead_than_asked_and_waiting_is_measured() {
         }
     })
     .unwrap();
-    std::thread::sleep(Duration::from_millis(300));
+    let started = Instant::now();
+    while made.load(Ordering::SeqCst) < 6 && started.elapsed() < Duration::from_secs(30) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    // Time for a seventh, which must not come.
+    std::thread::sleep(Duration::from_millis(200));
     assert_eq!(made.load(Ordering::SeqCst), 6);
     let handed: Vec<u64> = (0..20).map(|_| feed.take().unwrap()).collect();
     assert_eq!(handed, (0..20).collect::<Vec<u64>>());

@@ -4,7 +4,7 @@
 mod common;
 
 use glam::{IVec3, Vec3};
-use net::guide::guide_channels;
+use net::guide::guide_at;
 use net::sample::Sample;
 use train::data::guide::StereoMaps;
 use train::data::{Augment, SampleOptions, Sampler};
@@ -35,13 +35,13 @@ fn off(sample: &Sample) -> (f64, usize) {
                 .into()
         })
         .collect();
-    let channels = guide_channels(&sites, 0.04, Vec3::ZERO, &sample.guide);
-    let near = channels
+    let says = guide_at(&sites, 0.04, Vec3::ZERO, &sample.guide);
+    let near = says
         .iter()
         .zip(&sample.truth.tsdf)
-        .filter(|([_, weight], truth)| *weight > 0.5 && truth.abs() < 0.9);
+        .filter(|(said, truth)| said.weight > 0.5 && truth.abs() < 0.9);
     let differences: Vec<f64> = near
-        .map(|([guide, _], truth)| f64::from((guide - truth).abs()))
+        .map(|(said, truth)| f64::from((said.distance - truth).abs()))
         .collect();
     let count = differences.len();
     (differences.iter().sum::<f64>() / count.max(1) as f64, count)

@@ -170,6 +170,17 @@ fn the_rate_warms_up_and_falls() {
 }
 
 #[test]
+fn the_rate_can_fall_to_nothing() {
+    let mut config = common::settings(Path::new("anywhere"), 20);
+    config.train.rate_falls_from = Some(10);
+    let expected = [0.005, 0.01, 0.01, 0.009, 0.8e-4, 0.1e-4, 0.0];
+    for (step, expected) in [1, 9, 10, 11, 12, 19, 20].into_iter().zip(expected) {
+        let found = config.rate(step);
+        assert!((found - expected).abs() < 1e-12, "step {step}: {found}");
+    }
+}
+
+#[test]
 fn adam_is_burns() {
     let device = Device::flex().autodiff();
     let first = TASK.fresh(3, &device).unwrap();

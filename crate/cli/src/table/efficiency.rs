@@ -47,21 +47,18 @@ pub fn table(
     let mut figures = Vec::new();
     for method in methods {
         let mut row = vec![method.name.clone()];
-        match method.as_network() {
-            None => row.resize(head.len(), "–".to_owned()),
-            Some(network) => {
-                let picture_ms = picture_ms(network, size, device);
-                row.extend([
-                    format!("{picture_ms:.1}"),
-                    format!("{:.1}", 1e3 / picture_ms),
-                ]);
-                for &views in views {
-                    let piece_ms = piece_ms(network, size, views, device);
-                    row.push(format!("{piece_ms:.1}"));
-                    figures.push(json!({
+        if let Some(network) = method.as_network() {
+            let picture_ms = picture_ms(network, size, device);
+            row.extend([
+                format!("{picture_ms:.1}"),
+                format!("{:.1}", 1e3 / picture_ms),
+            ]);
+            for &views in views {
+                let piece_ms = piece_ms(network, size, views, device);
+                row.push(format!("{piece_ms:.1}"));
+                figures.push(json!({
                         "method": method.name, "picture_ms": picture_ms, "views": views, "piece_ms": piece_ms,
                     }));
-                }
             }
         }
         found.push(row);

@@ -100,7 +100,6 @@ pub fn means<'a>(cells: impl Iterator<Item = &'a Cell>) -> Option<Means> {
 }
 
 /// How steady a method is over numbers of views, by the paper's formulas; as fractions.
-#[derive(Serialize)]
 pub struct Steadiness {
     /// Coefficient of variation of F with the variance of a sample (n - 1), as the paper has it for others.
     pub cv_sample: f64,

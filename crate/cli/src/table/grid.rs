@@ -9,8 +9,11 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Without a title. Every row is as long as the head.
-    pub fn new(head: &[&str], rows: Vec<Vec<String>>) -> Self {
+    /// Without a title. What a row lacks towards the head's length was not measured, and shows as a dash.
+    pub fn new(head: &[&str], mut rows: Vec<Vec<String>>) -> Self {
+        for row in &mut rows {
+            row.resize(head.len(), "–".to_owned());
+        }
         Self {
             title: None,
             head: head.iter().map(|cell| (*cell).to_owned()).collect(),

@@ -104,30 +104,35 @@ fn name(method: &Method, views: Option<usize>, setting: &Setting) -> String {
     }
 }
 
-/// A row for each method and number of views; `figures` are what follows the name, `width` of them.
+/// A row for each method and number of views; `figures` are what follows the name.
 fn each(
+    head: &[&str],
     methods: &[Method],
     cells: &[Cell],
     setting: &Setting,
-    width: usize,
     figures: impl Fn(&Means) -> Vec<String>,
-) -> Vec<Vec<String>> {
+) -> Grid {
     let mut rows = Vec::new();
     for method in methods {
         for &views in &setting.views {
             let mut row = vec![name(method, views, setting)];
-            match of(cells, method, views, |_| true) {
-                Some(means) => row.extend(figures(&means)),
-                None => row.resize(width + 1, "–".to_owned()),
-            }
+            row.extend(of(cells, method, views, |_| true).iter().flat_map(&figures));
             rows.push(row);
         }
     }
-    rows
+    Grid::new(head, rows)
 }
 
 fn share(value: f64) -> String {
     format!("{value:.3}")
+}
+
+/// Precision, recall and F.
+fn quality(means: &Means) -> Vec<String> {
+    means.surface[3..]
+        .iter()
+        .map(|value| share(*value))
+        .collect()
 }
 
 fn mesh(methods: &[Method], cells: &[Cell], setting: &Setting) -> Grid {
@@ -148,10 +153,7 @@ fn mesh(methods: &[Method], cells: &[Cell], setting: &Setting) -> Grid {
         row.push(format!("{:.1}", means.seconds));
         row
     };
-    Grid::new(
-        &head,
-        each(methods, cells, setting, head.len() - 1, figures),
-    )
+    each(&head, methods, cells, setting, figures)
 }
 
 fn depth(methods: &[Method], cells: &[Cell], setting: &Setting) -> Grid {
@@ -167,7 +169,7 @@ fn depth(methods: &[Method], cells: &[Cell], setting: &Setting) -> Grid {
         "Comp",
     ];
     let figures = |means: &Means| match &means.depth {
-        None => vec!["–".to_owned(); 8],
+        None => Vec::new(),
         Some(of) => [
             of.abs_rel,
             of.abs_diff,
@@ -181,22 +183,16 @@ fn depth(methods: &[Method], cells: &[Cell], setting: &Setting) -> Grid {
         .map(share)
         .to_vec(),
     };
-    Grid::new(
-        &head,
-        each(methods, cells, setting, head.len() - 1, figures),
-    )
+    each(&head, methods, cells, setting, figures)
 }
 
 fn views(methods: &[Method], cells: &[Cell], setting: &Setting) -> Vec<Grid> {
-    let quality = Grid::new(
-        &["", "Prec", "Recall", "F", "keyframes"],
-        each(methods, cells, setting, 4, |means| {
-            let [.., precision, recall, f] = means.surface;
-            let mut row = [precision, recall, f].map(share).to_vec();
-            row.push(format!("{:.0}", means.keyframes));
-            row
-        }),
-    );
+    let head = ["", "Prec", "Recall", "F", "keyframes"];
+    let quality = each(&head, methods, cells, setting, |means| {
+        let mut row = quality(means);
+        row.push(format!("{:.0}", means.keyframes));
+        row
+    });
     let counts = steady_counts(setting);
     let list: Vec<String> = counts.iter().map(usize::to_string).collect();
     let list = list.join(", ");
@@ -209,19 +205,16 @@ fn views(methods: &[Method], cells: &[Cell], setting: &Setting) -> Vec<Grid> {
                 .map(|&views| of(cells, method, Some(views), |_| true))
                 .collect();
             let mut row = vec![method.name.clone()];
-            match means
-                .filter(|means| means.len() > 1)
-                .and_then(|means| steadiness(&means))
-            {
-                None => row.resize(7, "–".to_owned()),
-                Some(of) => row.extend([
+            let several = means.filter(|means| means.len() > 1);
+            if let Some(of) = several.and_then(|means| steadiness(&means)) {
+                row.extend([
                     percent(of.cv_sample),
                     percent(of.cv_population),
                     percent(of.retention_f),
                     percent(of.retention),
                     percent(of.max_drop),
-                    format!("{:.3}", of.stability),
-                ]),
+                    share(of.stability),
+                ]);
             }
             row
         })
@@ -260,13 +253,9 @@ fn generalization(methods: &[Method], cells: &[Cell], setting: &Setting) -> Grid
         for method in methods {
             for &views in &setting.views {
                 let mut row = vec![set.to_owned(), name(method, views, setting)];
-                match of(cells, method, views, |cell| cell.set == set) {
-                    None => row.resize(6, "–".to_owned()),
-                    Some(means) => {
-                        let [.., precision, recall, f] = means.surface;
-                        row.extend([precision, recall, f].map(share));
-                        row.push(means.cells.to_string());
-                    }
+                if let Some(means) = of(cells, method, views, |cell| cell.set == set) {
+                    row.extend(quality(&means));
+                    row.push(means.cells.to_string());
                 }
                 found.push(row);
             }
@@ -292,10 +281,7 @@ fn ablation(methods: &[Method], cells: &[Cell], setting: &Setting) -> Grid {
                 .map(|on| if on { "yes" } else { "" }.to_owned())
                 .to_vec(),
             });
-            match of(cells, method, views, |_| true) {
-                None => row.resize(9, "–".to_owned()),
-                Some(means) => row.extend(means.surface[3..].iter().map(|value| share(*value))),
-            }
+            row.extend(of(cells, method, views, |_| true).iter().flat_map(quality));
             found.push(row);
         }
     }

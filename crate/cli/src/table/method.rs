@@ -1,7 +1,7 @@
 //! The rows of a table: ways from a scan to a mesh.
 
 use super::setting::Setting;
-use crate::{failure::Failure, files::read_mesh, weights::Weights};
+use crate::{failure::Failure, files::read_mesh, job::surface, weights::Weights};
 use burn::tensor::Device;
 use mesh::Mesh;
 use net::{Ipdrecon, NetConfig, weights};
@@ -150,13 +150,7 @@ impl Method {
                 _ => recon::run(scan, &plan, &setting.device, &mut Quiet).await,
             }
         })?;
-        let mut mesh = pollster::block_on(outcome.volume.mesh())?;
-        if mesh.triangles.is_empty() {
-            return Err(Failure::NoSurface {
-                keyframes: outcome.frames_fused,
-            });
-        }
-        recon::place(&mut mesh, scan, false);
+        let (mesh, _) = surface(&outcome, scan, false)?;
         Ok(Made {
             mesh,
             keyframes: plan.keyframes.len(),

@@ -2,7 +2,7 @@
 
 use burn::tensor::Device;
 use recon::{Limits, evaluate};
-use std::path::PathBuf;
+use std::{num::NonZeroUsize, path::PathBuf};
 
 /// What all cells share.
 pub struct Setting {
@@ -26,4 +26,6 @@ pub struct Setting {
     pub device_name: String,
     /// What it allows.
     pub limits: Limits,
+    /// Scans at a time.
+    pub jobs: NonZeroUsize,
 }

@@ -1,7 +1,7 @@
 //! Stereo's depth of a scan's keyframes, for networks with the switch `guide`.
 
 use super::crop::Crop;
-use super::picture::{mirror, pinhole, single};
+use super::picture::{mirror_view, pinhole, single};
 use crate::random::Random;
 use burn::tensor::Device;
 use glam::{Affine3A, Vec3};
@@ -144,9 +144,7 @@ impl StereoMap {
             .map(|c| f32::from(*c) / 255.0)
             .collect();
         if crop.mirrored {
-            camera.cx = camera.width as f32 - 1.0 - camera.cx;
-            mirror(&mut depth_m, camera.width as usize);
-            mirror(&mut confidence, camera.width as usize);
+            mirror_view(&mut camera, [&mut depth_m, &mut confidence]);
         }
         GuideMap {
             view: View {

@@ -137,6 +137,14 @@ fn cover(start: f32, len: f32, count: usize, limit: usize) -> Vec<Vec<(usize, f3
         .collect()
 }
 
+/// Mirrors what a camera sees: itself, and two pictures of its width.
+pub fn mirror_view(camera: &mut Pinhole, pictures: [&mut [f32]; 2]) {
+    camera.cx = camera.width as f32 - 1.0 - camera.cx;
+    for picture in pictures {
+        mirror(picture, camera.width as usize);
+    }
+}
+
 /// Mirrors rows of `width` values in place.
 pub fn mirror(values: &mut [f32], width: usize) {
     values.chunks_exact_mut(width).for_each(<[f32]>::reverse);

@@ -2,7 +2,7 @@
 
 use super::augment;
 use super::crop::{Crop, CropChance};
-use super::picture::{Fit, mirror, single};
+use super::picture::{Fit, mirror_view, single};
 use super::set::ScanSet;
 use super::views::{self, Sight};
 use super::volume::{TruthVolume, VOXEL_M};
@@ -188,9 +188,7 @@ impl Sampler {
             None => vec![0.0; camera.pixels()],
         };
         if crop.mirrored {
-            camera.cx = camera.width as f32 - 1.0 - camera.cx;
-            mirror(&mut image, camera.width as usize);
-            mirror(&mut depth, camera.width as usize);
+            mirror_view(&mut camera, [&mut image, &mut depth]);
         }
         let noise = self.pose_noise(random);
         sample.views.push(View {

@@ -9,8 +9,7 @@ use burn::{
     Tensor,
     tensor::{DType, Device, TensorData},
 };
-use glam::{IVec3, Vec3};
-use net::{Level, View, guide::guide_channels, sample::GuideMap};
+use net::{View, guide::Guidance, model::GUIDE_CHANNELS, sample::GuideMap};
 use scan::{Finding, Scan, Severity};
 use stereo::{Step, StereoConfig, StereoError};
 
@@ -80,15 +79,9 @@ pub(super) async fn maps(
     Ok(Some(maps))
 }
 
-/// What the maps say of a level's sites: `[N, 2]`.
-pub(super) fn at(
-    sites: &[IVec3],
-    level: Level,
-    origin_m: Vec3,
-    maps: &[GuideMap],
-    device: &Device,
-) -> Tensor<2> {
-    let channels = guide_channels(sites, level.voxel_size_m(), origin_m, maps);
-    let data = TensorData::new(channels.concat(), [sites.len(), 2]);
+/// What the maps say of sites as the 3D network is given it: `[N, 2]`.
+pub(super) fn tensor(says: &[Guidance], device: &Device) -> Tensor<2> {
+    let values: Vec<f32> = says.iter().flat_map(|said| said.channels()).collect();
+    let data = TensorData::new(values, [says.len(), GUIDE_CHANNELS]);
     Tensor::from_data(data, (device, DType::F32))
 }

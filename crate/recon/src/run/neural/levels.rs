@@ -12,6 +12,7 @@ use glam::IVec3;
 use net::{
     Level, View,
     decode::children,
+    guide::guide_at,
     model::{Decoded, TSDF_SCALE},
     sample::GuideMap,
 };
@@ -73,7 +74,9 @@ pub(super) async fn decode<N: Network>(
         let Some(fused) = lattice.fuse(scene, network, sink).await else {
             return Ok(None);
         };
-        let maps = scene.guide;
+        let says = scene
+            .guide
+            .map(|maps| guide_at(&sites, level.voxel_size_m(), origin_m, maps));
         let parents = above.take();
         let decoded = network.decode(
             level,
@@ -84,17 +87,20 @@ pub(super) async fn decode<N: Network>(
                 above: parents
                     .as_ref()
                     .map(|(decoded, parents)| (decoded, rows(parents.clone(), device))),
-                guide: maps.map(|maps| guide::at(&sites, level, origin_m, maps, device)),
+                guide: says.as_deref().map(|says| guide::tensor(says, device)),
             },
         );
         let logits = read(decoded.logit.clone()).await?;
         sink.progress(lattice.blocks().len() + 1);
         if level == Level::Fine {
-            let distances = logits.iter().map(|&logit| TSDF_SCALE * logit.tanh());
-            return Ok(Some(Field {
-                distances: distances.collect(),
-                sites,
-            }));
+            let mut distances: Vec<f32> = logits
+                .iter()
+                .map(|&logit| TSDF_SCALE * logit.tanh())
+                .collect();
+            for (distance, said) in distances.iter_mut().zip(says.iter().flatten()) {
+                *distance = said.mean_with(*distance);
+            }
+            return Ok(Some(Field { sites, distances }));
         }
         let kept = occupied(&logits, level, sink);
         if kept.is_empty() {
