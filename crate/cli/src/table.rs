@@ -18,7 +18,7 @@ use method::Method;
 use recon::NetworkConfig;
 use report::Report;
 use scans::named;
-use setting::Setting;
+use setting::{Of, Setting};
 use std::{
     fs,
     num::NonZeroUsize,
@@ -44,12 +44,15 @@ pub struct Arguments {
     /// Weights of one more row; or a mesh (.ply, in the canonical world) that is the same guess for every scan.
     #[arg(long, value_name = "NAME=FILE")]
     row: Vec<String>,
-    /// Take at most this many keyframes of a scan, evenly spread, for every row; several for `views`, such as 60,80,100.
-    /// Without it all are taken. For `efficiency`: views of a chunk.
+    /// Take at most this many views of each scan, or of each tile with --of tile; several for `views`, such as 60,80,100.
+    /// Without it all keyframes are taken. For `efficiency`: views of a chunk.
     #[arg(long, value_delimiter = ',')]
     views: Vec<usize>,
-    /// Make each tile of the room from at most this many of them; without it what suits the weights.
-    #[arg(long)]
+    /// What --views bounds.
+    #[arg(long, value_enum, default_value_t = Of::Scan)]
+    of: Of,
+    /// Make each tile of the room from at most this many keyframes; without it what suits the weights.
+    #[arg(long, conflicts_with = "of")]
     tile_views: Option<usize>,
     /// Choose the views of a tile at random with the seeds 0, 1, … below this; without it by what they cover, which no
     /// seed changes.
@@ -100,6 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
                 [] => vec![None],
                 views => views.iter().copied().map(Some).collect(),
             },
+            of: arguments.of,
             tile_views: arguments.tile_views,
             seeds: arguments.seeds,
             protocol: arguments.protocol.into(),

@@ -157,6 +157,40 @@ fn steadiness_follows_the_papers_formulas() {
     );
 }
 
+/// The paper's way: rows without tiles stay as they are, and every row has all keyframes.
+#[test]
+fn views_of_a_tile_change_rows_with_tiles_alone() {
+    let folder = folder();
+    let scans = str(&folder.path().join("list.txt")).to_owned();
+    let arguments = [
+        "--scans", &scans, "--of", "tile", "--views", "2,9", "--jobs", "2",
+    ];
+    let (markdown, cells) = table(folder.path(), "views", &arguments);
+    assert_eq!(cells.len(), 12, "{markdown}");
+    let both = |method| [2, 9].map(|views| figure(&cells, method, Some(views), "f_score"));
+    for method in ["depth fusion", "stereo"] {
+        let [few, many] = both(method);
+        assert_eq!(few, many, "{method}");
+    }
+    let [few, many] = both("ours");
+    assert_ne!(few, many, "{markdown}");
+    let keyframes = |views: &str| row(&markdown, &format!("ours, {views} views"))[3].to_owned();
+    assert_eq!(keyframes("2"), keyframes("9"));
+    assert!(markdown.contains("keyframes of a scan: all"), "{markdown}");
+    assert!(
+        markdown.contains("at most so many views each: 2, 9"),
+        "{markdown}"
+    );
+    let names: Vec<&str> = cells
+        .iter()
+        .map(|cell| cell["scan"].as_str().unwrap())
+        .collect();
+    assert!(
+        names.is_sorted(),
+        "in the scans' order, however many at a time"
+    );
+}
+
 #[test]
 fn a_report_shows_every_mesh() {
     let folder = folder();

@@ -10,7 +10,7 @@ use mesh::metrics::{
 use serde::Serialize;
 
 /// One mesh of a method, judged.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub struct Cell {
     /// The set that the scan belongs to.
     pub set: String,
@@ -18,7 +18,7 @@ pub struct Cell {
     pub scan: String,
     /// The row.
     pub method: String,
-    /// The most keyframes; `None` for all.
+    /// The most views, of the scan or of a tile; `None` for all.
     pub views: Option<usize>,
     /// Seed of the choice of views.
     pub seed: u64,

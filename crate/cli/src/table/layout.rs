@@ -4,7 +4,7 @@ use super::{
     figures::{Cell, Means, means, steadiness},
     grid::Grid,
     method::Method,
-    setting::Setting,
+    setting::{Of, Setting},
 };
 use clap::ValueEnum;
 use serde_json::{Value, json};
@@ -311,20 +311,21 @@ fn notes(methods: &[Method], cells: &[Cell], setting: &Setting) -> Vec<String> {
         .iter()
         .map(|views| views.map_or("all".to_owned(), |views| views.to_string()))
         .collect();
+    let views = views.join(", ");
     let choice = match setting.seeds {
         Some(seeds) => format!("views of a tile at random, {seeds} seeds"),
         None => "views of a tile by coverage, which has no chance in it".to_owned(),
     };
-    let tile = match setting.tile_views {
-        Some(views) => format!("{views} views a tile"),
-        None => "20 views a tile for small networks, 100 for full ones".to_owned(),
+    let (keyframes, tile) = match (setting.of, setting.tile_views) {
+        (Of::Tile, _) => ("all".to_owned(), views),
+        (Of::Scan, Some(of_tile)) => (views, of_tile.to_string()),
+        (Of::Scan, None) => (views, "20 for small networks, 100 for full ones".to_owned()),
     };
     let mut notes = vec![format!(
-        "{} scans, means over meshes; protocol {:?}, threshold 5 cm; truth {truth}; keyframes of a scan: {}; tiles of 3.84 x 3.84 x 1.92 m, {tile}; \
+        "{} scans, means over meshes; protocol {:?}, threshold 5 cm; truth {truth}; keyframes of a scan: {keyframes}; tiles of 3.84 x 3.84 x 1.92 m, at most so many views each: {tile}; \
          {choice}; {}; version {}, commit {}.",
         scans.len(),
         setting.protocol,
-        views.join(", "),
         setting.device_name,
         env!("CARGO_PKG_VERSION"),
         env!("IPDRECON_COMMIT"),

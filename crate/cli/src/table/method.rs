@@ -1,6 +1,6 @@
 //! The rows of a table: ways from a scan to a mesh.
 
-use super::setting::Setting;
+use super::setting::{Of, Setting};
 use crate::{failure::Failure, files::read_mesh, job::surface, weights::Weights};
 use burn::tensor::Device;
 use mesh::Mesh;
@@ -105,7 +105,7 @@ impl Method {
         self.as_network().map(Ipdrecon::config)
     }
 
-    /// The mesh of a scan from at most `views` keyframes.
+    /// The mesh of a scan from at most `views`, of the scan or of a tile.
     ///
     /// # Errors
     /// What the run says.
@@ -117,6 +117,10 @@ impl Method {
         setting: &Setting,
     ) -> Result<Made, Failure> {
         let started = Instant::now();
+        let (keyframes, tile_views) = match setting.of {
+            Of::Scan => (views, setting.tile_views),
+            Of::Tile => (None, views),
+        };
         let depth = match &self.source {
             Source::Missing => return Err(Failure::NoWeights),
             Source::Guess(mesh) => {
@@ -131,11 +135,11 @@ impl Method {
             Source::Sensor => DepthSource::Sensor,
             Source::Stereo => DepthSource::Stereo(StereoConfig::default()),
             Source::Network(network) => {
-                DepthSource::Network(network_config(network.config(), seed, setting))
+                DepthSource::Network(network_config(network.config(), tile_views, seed, setting))
             }
         };
         let options = Options {
-            views,
+            views: keyframes,
             max_depth_m: setting.reach_m,
             depth: Some(depth),
             ..Options::default()
@@ -159,11 +163,16 @@ impl Method {
     }
 }
 
-fn network_config(config: &NetConfig, seed: u64, setting: &Setting) -> NetworkConfig {
+fn network_config(
+    config: &NetConfig,
+    tile_views: Option<usize>,
+    seed: u64,
+    setting: &Setting,
+) -> NetworkConfig {
     let usual = Preset::of(config).config();
     NetworkConfig {
         size: setting.size.unwrap_or(usual.size),
-        views_a_tile: setting.tile_views.unwrap_or(usual.views_a_tile),
+        views_a_tile: tile_views.unwrap_or(usual.views_a_tile),
         reach_m: setting.reach_m,
         seed,
         choice: match setting.seeds {
