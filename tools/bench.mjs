@@ -1,7 +1,8 @@
 // `npm run bench`: prepares the machine, measures, and writes the tables to BENCHMARKS.md. All rows of a table come from one run.
-import { writeFileSync } from 'node:fs';
+import { readFileSync, writeFileSync } from 'node:fs';
 import { cpus } from 'node:os';
 import { join } from 'node:path';
+import { sections } from './bench/section.mjs';
 import { buildEnv, gpu } from './env.mjs';
 import { must, root } from './run.mjs';
 import { setup } from './setup.mjs';
@@ -57,5 +58,6 @@ ${step}
 
 ${browser}
 `;
-writeFileSync(join(root, 'BENCHMARKS.md'), text);
+const file = join(root, 'BENCHMARKS.md');
+writeFileSync(file, `${text}\n${sections(readFileSync(file, 'utf8'))}\n`);
 console.log(text);

@@ -1,6 +1,7 @@
 // Sources to the two things that are published: `web/dist` (the npm package) and `www/dist` (the static site, which uses that package).
 // `--quick` leaves wasm-opt out, for a short way from a change to the page.
-import { cpSync, existsSync, mkdirSync, readdirSync, rmSync } from 'node:fs';
+import { createHash } from 'node:crypto';
+import { cpSync, existsSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { buildEnv, wasmEnv } from './env.mjs';
 import { Missing, isMain, must, root, run, seconds } from './run.mjs';
@@ -8,7 +9,7 @@ import { optimise } from './wasm-opt.mjs';
 
 const at = (...parts) => join(root, ...parts);
 const engine = ['engine.js', 'engine.d.ts', 'engine_bg.wasm', 'engine_bg.wasm.d.ts'];
-const sources = ['worker/src/lib.rs', 'worker/src/worker.ts', 'web/src', 'web/tsconfig.json', 'web/tsconfig.worker.json', 'www/src', 'www/tsconfig.json', 'www/index.html'];
+const sources = ['weights/ipdrecon.safetensors', 'worker/src/lib.rs', 'worker/src/worker.ts', 'web/src', 'web/tsconfig.json', 'web/tsconfig.worker.json', 'www/src', 'www/tsconfig.json', 'www/index.html'];
 const notServed = new Set(['src', 'dist', 'node_modules', 'tsconfig.json', 'package.json', 'README.md']);
 
 function fresh(folder) {
@@ -26,8 +27,19 @@ async function tsc(project) {
   if (result.code !== 0) throw Object.assign(new Error(`tsc -p ${project} found errors`), { output: result.output });
 }
 
+/** The released weights, and a module that says where they lie, what they must hash to and how large they are. */
+function weights() {
+  const name = 'ipdrecon.safetensors';
+  cpSync(at('weights', name), at('web/dist', name));
+  const file = readFileSync(at('weights', name));
+  const sha256 = createHash('sha256').update(file).digest('hex');
+  writeFileSync(at('web/dist/released.js'), `export const released = ${JSON.stringify({ url: `./${name}`, sha256, bytes: file.length })};\n`);
+  writeFileSync(at('web/dist/released.d.ts'), 'export declare const released: { url: string; sha256: string; bytes: number };\n');
+}
+
 async function assemble(quick) {
   fresh(at('web/dist'));
+  weights();
   for (const name of engine) cpSync(at('worker/pkg', name), at('web/dist', name));
   if (!quick) await optimise(at('web/dist/engine_bg.wasm'));
   await tsc('web/tsconfig.worker.json');

@@ -18,6 +18,10 @@ export const fuse = (scan, out) => execute(program, ['fuse', scan, '-o', out]);
 export const stereo = (scan, out, { views, size, device = 'cpu' }) =>
   execute(program, ['stereo', scan, '-o', out, '--views', String(views), '--size', size, '--device', device], { env: gpu(buildEnv()) });
 
+/** The network's surface from the photos of a scan, into a mesh. */
+export const reconstruct = (scan, out, { keyframes, device = 'cpu' }) =>
+  execute(program, ['reconstruct', scan, '-o', out, '--preset', 'small', '--keyframes', String(keyframes), '--device', device], { env: gpu(buildEnv()) });
+
 /** Writes the sample room as a folder of files. */
 export const sampleFolder = (folder) => execute(join(root, 'target/release/examples/sample_folder'), [folder]);
 

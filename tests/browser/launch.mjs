@@ -10,7 +10,7 @@ import { serve } from '../../tools/serve.mjs';
 export const pictures = join(toolsDir, 'pictures');
 mkdirSync(pictures, { recursive: true });
 
-const events = ['ready', 'opened', 'planned', 'stage', 'progress', 'bricks', 'paused', 'resumed', 'finished', 'finding', 'failed', 'exported', 'cameraChanged'];
+const events = ['ready', 'opened', 'weights', 'planned', 'stage', 'progress', 'bricks', 'paused', 'resumed', 'finished', 'finding', 'failed', 'exported', 'cameraChanged'];
 
 /** Runs in the page before its own scripts: every event of the element and every long task, with its time. */
 function record(types) {

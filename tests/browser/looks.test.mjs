@@ -47,9 +47,12 @@ for (const [width, height] of [[1280, 800], [360, 740]]) {
       await inspect(visitor, name('failed'));
       await page.goto(`${browser.url}?sample&autostart=0`);
       await visitor.until('planned');
-      await page.getByLabel('Depth from').selectOption('the photos');
+      await page.getByLabel('Depth from').selectOption('stereo');
       await page.getByLabel('Photos scaled to').waitFor();
       await inspect(visitor, name('plan'));
+      await page.getByLabel('Depth from').selectOption('the network');
+      await page.getByText('Weights: those of this page').waitFor();
+      await inspect(visitor, name('plan-network'));
       await visitor.close();
     });
   }

@@ -1,9 +1,10 @@
 // The way a first visitor goes: the sample room, from the click to the file on the disk.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import validator from 'gltf-validator';
-import { visit } from './launch.mjs';
+import { pictures, visit } from './launch.mjs';
 
 let browser;
 before(async () => {
@@ -70,11 +71,15 @@ test('each shading is another picture, and so are the cameras and the view from 
     seen.set(name, last.hash);
   };
   await look('colour');
-  for (const name of ['Normal', 'Wire', 'Depth']) {
+  for (const name of ['Normal', 'Wire', 'Depth', 'Views']) {
     await page.getByText(name, { exact: true }).click();
     await look(name);
+    await page.screenshot({ path: join(pictures, `shading-${name}.png`) });
   }
+  assert.match(await page.locator('#legend').innerText(), /Frames that measured it\s+1\s+2\s+4\s+8\s+16\s+32\+/);
+  assert.ok(await page.getByRole('radio', { name: 'Confidence' }).isDisabled(), "a sensor's depth has no confidence");
   await page.getByText('Colour', { exact: true }).click();
+  assert.ok(await page.locator('#legend').isHidden());
   await page.click('#cameras');
   await look('cameras');
   await page.click('#look-top');
@@ -124,6 +129,8 @@ test('with a review the plan waits, and its options change it', async () => {
   await page.waitForTimeout(500);
   assert.equal(await visitor.state(), 'planned', 'it waits');
   assert.match(await page.locator('#plan').innerText(), new RegExp(`${plan.keyframes} of ${plan.frames}`));
+  assert.match(await page.locator('#plan').innerText(), /Expected time\s+about \d+ s/);
+  assert.ok(plan.expectedS > 0 && plan.downloadBytes === undefined);
 
   await page.getByLabel('Voxel size').selectOption('8 cm');
   await page.getByLabel('Keyframes').selectOption('every 2nd');

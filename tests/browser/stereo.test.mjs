@@ -1,6 +1,6 @@
 // Photos without depth: the page says that it will estimate depth, matches the views, and the mesh is the command line's.
 import assert from 'node:assert/strict';
-import { copyFileSync, existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync } from 'node:fs';
+import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
@@ -8,6 +8,7 @@ import { root } from '../../tools/run.mjs';
 import { chamfer, vertices } from './chamfer.mjs';
 import { build, fuse, judge, sampleFolder, stereo } from './command-line.mjs';
 import { pictures, visit } from './launch.mjs';
+import { choose, progressOf, save, stages, withoutDepth } from './photos.mjs';
 import { put, scan } from './scene.mjs';
 
 const out = mkdtempSync(join(tmpdir(), 'ipdrecon-'));
@@ -22,43 +23,7 @@ after(async () => {
   await browser.close();
 });
 
-/** A copy of a scan in the layout of 7-Scenes, its depth images left out. */
-function withoutDepth(scan, name) {
-  const folder = join(out, name);
-  mkdirSync(folder);
-  for (const file of readdirSync(scan).filter((file) => !file.endsWith('.depth.png'))) copyFileSync(join(scan, file), join(folder, file));
-  return folder;
-}
-
-/** Downloads the mesh as PLY, to a file of this name. */
-async function save(visitor, name) {
-  const path = join(out, name);
-  copyFileSync(await (await visitor.download('[data-format=ply]')).path(), path);
-  return path;
-}
-
-/** Chooses a size of the photos and a number of keyframes on the page, and waits for the plan with them. */
-async function choose({ page }, { size, keyframes }) {
-  const planned = () => page.evaluate(() => window.record.events.filter(({ type }) => type === 'planned').length);
-  for (const [label, option] of [['Photos scaled to', size], ['Keyframes', keyframes]]) {
-    const before = await planned();
-    await page.getByLabel(label).selectOption(option);
-    await page.waitForFunction((before) => window.record.events.filter(({ type }) => type === 'planned').length > before, before);
-  }
-}
-
-const stages = async (visitor) => (await visitor.events('stage')).map(({ stage }) => stage);
 const panel = ({ page }) => page.locator('#panel').innerText();
-
-/** Progress within a stage. */
-async function progressOf(visitor, stage) {
-  const events = await visitor.page.evaluate(() => window.record.events.filter(({ type }) => type === 'stage' || type === 'progress'));
-  let current;
-  return events.filter((event) => {
-    if (event.type === 'stage') current = event.stage;
-    return event.type === 'progress' && current === stage;
-  });
-}
 
 test('a room without depth is planned, matched, looked at and saved', async (t) => {
   await build();
@@ -67,14 +32,13 @@ test('a room without depth is planned, matched, looked at and saved', async (t) 
   const visitor = await browser.open({ path: '?autostart=0' });
   await visitor.until('idle');
   await visitor.forget();
-  await visitor.drop(withoutDepth(whole, 'photos'));
+  await visitor.drop(withoutDepth(whole, join(out, 'photos')));
   await visitor.until('planned');
   const [opened] = await visitor.events('opened');
   assert.deepEqual([opened.hasDepth, opened.hasColor], [false, true]);
-  assert.equal((await visitor.events('planned')).at(-1).plan.depth, 'stereo');
-  assert.match(await panel(visitor), /no depth images: depth is estimated from its photos/);
-  assert.ok(await visitor.page.getByLabel('Depth from').isDisabled(), 'there is nothing to choose');
-  await choose(visitor, { size: '160 × 120', keyframes: '60' });
+  assert.equal((await visitor.events('planned')).at(-1).plan.depth, 'network', 'the network makes more of photos, unless told otherwise');
+  await choose(visitor, { 'Depth from': 'stereo', 'Photos scaled to': '160 × 120', Keyframes: '60' });
+  assert.match(await panel(visitor), /no depth images\. Depth is estimated from the photos/);
   const { plan } = (await visitor.events('planned')).at(-1);
   const started_ms = await visitor.page.evaluate(() => performance.now());
   await visitor.page.click('#run');
@@ -101,7 +65,7 @@ test('a room without depth is planned, matched, looked at and saved', async (t) 
 
   const glb = readFileSync(await (await visitor.download('[data-format=glb]')).path());
   assert.equal(glb.toString('latin1', 0, 4), 'glTF');
-  const ply = await save(visitor, 'sample-stereo.ply');
+  const ply = await save(visitor, join(out, 'sample-stereo.ply'));
   const sensor = join(out, 'sample-sensor.ply');
   await fuse(whole, sensor);
   const { surface } = await judge(ply, sensor, 'plain');
@@ -119,13 +83,13 @@ for (const device of ['auto', 'cpu']) {
       return;
     }
     await build();
-    const photos = withoutDepth(path, `hololens-${device}`);
+    const photos = withoutDepth(path, join(out, `hololens-${device}`));
     const visitor = await browser.open({ path: `?autostart=0&device=${device}` });
     const { page } = visitor;
     await visitor.until('idle');
     await visitor.drop(photos);
     await visitor.until('planned');
-    await choose(visitor, { size: '160 × 120', keyframes: '30' });
+    await choose(visitor, { 'Depth from': 'stereo', 'Photos scaled to': '160 × 120', Keyframes: '30' });
     const { plan } = (await visitor.events('planned')).at(-1);
     assert.equal(plan.keyframes, 30);
     assert.deepEqual(plan.options.stereoSize, { widthPx: 160, heightPx: 120 });
@@ -136,7 +100,7 @@ for (const device of ['auto', 'cpu']) {
     assert.ok(finished.elapsedS < 240, `${finished.elapsedS} s, less than 4 minutes expected`);
     assert.ok((await visitor.picture()).colours > 100, 'the room is in the picture');
     await page.screenshot({ path: join(pictures, `hololens-stereo-${device}.png`) });
-    const ply = await save(visitor, `hololens-stereo-${device}.ply`);
+    const ply = await save(visitor, join(out, `hololens-stereo-${device}.ply`));
     const [{ device: found }] = await visitor.events('ready');
     await visitor.close();
 
@@ -158,10 +122,8 @@ test('with depth and photos there is a choice, and the sensor comes first', asyn
   assert.ok(await source.isEnabled());
   assert.equal(await source.inputValue(), 'sensor');
   assert.ok(await page.getByLabel('Photos scaled to').isHidden(), 'photos are scaled for stereo alone');
-  await source.selectOption('the photos');
-  await page.waitForFunction(() => window.record.events.some(({ type, plan }) => type === 'planned' && plan.depth === 'stereo'));
+  await choose(visitor, { 'Depth from': 'stereo', 'Photos scaled to': '160 × 120', Keyframes: '30' });
   await page.getByText('Depth is estimated from the photos, which takes longer').waitFor();
-  await choose(visitor, { size: '160 × 120', keyframes: '30' });
   await page.click('#run');
   await visitor.within(300_000, 'finished');
   const [finished] = await visitor.events('finished');
@@ -183,9 +145,7 @@ for (const device of ['auto', 'cpu']) {
     const visitor = await browser.open({ path: `?sample&autostart=0&device=${device}` });
     const { page } = visitor;
     await visitor.until('planned');
-    await page.getByLabel('Depth from').selectOption('the photos');
-    await page.waitForFunction(() => window.record.events.some(({ type, plan }) => type === 'planned' && plan.depth === 'stereo'));
-    await choose(visitor, { size: '160 × 120', keyframes: '30' });
+    await choose(visitor, { 'Depth from': 'stereo', 'Photos scaled to': '160 × 120', Keyframes: '30' });
     await page.click('#run');
     await page.getByText(/^Matching views, \d+ of \d+$/).waitFor({ timeout: 60_000 });
     const asked_ms = await page.evaluate(() => performance.now());
@@ -220,9 +180,7 @@ test('the view can be turned while views are matched', async (t) => {
   const visitor = await browser.open({ path: '?sample&autostart=0' });
   const { page } = visitor;
   await visitor.until('planned');
-  await page.getByLabel('Depth from').selectOption('the photos');
-  await page.waitForFunction(() => window.record.events.some(({ type, plan }) => type === 'planned' && plan.depth === 'stereo'));
-  await choose(visitor, { size: '160 × 120', keyframes: '30' });
+  await choose(visitor, { 'Depth from': 'stereo', 'Photos scaled to': '160 × 120', Keyframes: '30' });
   await page.click('#run');
   await page.waitForFunction(() => window.record.events.some(({ type, triangles }) => type === 'bricks' && triangles > 0), null, { timeout: 240_000 });
   await visitor.forget();
@@ -245,11 +203,14 @@ test('the view can be turned while views are matched', async (t) => {
   await visitor.close();
 });
 
-test('photos that were all taken from one spot are refused with the reason', async () => {
+test('photos that were all taken from one spot: stereo refuses them with the reason, the network warns', async (t) => {
   const files = Object.fromEntries(Object.entries(scan(12)).filter(([path]) => !path.endsWith('.depth.png')));
-  const visitor = await browser.open();
+  const visitor = await browser.open({ path: '?autostart=0' });
   await visitor.until('idle');
   await visitor.drop(put(join(out, 'spot'), files));
+  await visitor.until('planned');
+  await choose(visitor, { 'Depth from': 'stereo' });
+  await visitor.page.click('#run');
   await visitor.until('failed');
   const [failed] = await visitor.events('failed');
   assert.equal(failed.code, 'scan');
@@ -257,6 +218,16 @@ test('photos that were all taken from one spot are refused with the reason', asy
   assert.match(failed.advice, /walk sideways/);
   await visitor.page.getByRole('button', { name: 'Back to the start' }).click();
   await visitor.until('idle');
+
+  await visitor.forget();
+  await visitor.drop(join(out, 'spot'));
+  await visitor.until('planned');
+  await choose(visitor, { 'Depth from': 'the network' });
+  await visitor.page.click('#run');
+  await visitor.until('finished');
+  const warned = (await visitor.events('finding')).find(({ finding }) => finding.code === 'no-guide');
+  assert.match(warned.finding.advice, /Walk sideways/);
+  t.diagnostic(`the network: ${(await visitor.events('finished'))[0].triangles} triangles`);
   await visitor.close();
 });
 

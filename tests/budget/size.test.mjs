@@ -18,6 +18,13 @@ test('the engine is at most 2.5 MB in brotli-11', (t) => {
   assert.ok(bytes <= ENGINE_BYTES, `${bytes} bytes, at most ${ENGINE_BYTES} expected`);
 });
 
+test('what libraries register is registered once, not at every entry from JavaScript', () => {
+  const wasm = readFileSync(join(process.env.CARGO_TARGET_DIR ?? join(root, 'target'), 'wasm32-unknown-unknown/web/worker.wasm'));
+  assert.ok(wasm.includes('__wasm_call_ctors'), 'the linker names what it makes');
+  // So it calls the exports that it wraps in a call of all registrations.
+  assert.ok(!wasm.includes('command_export'), 'the engine must call __wasm_call_ctors itself: worker/src/lib.rs');
+});
+
 test('our own JavaScript is at most 40 kB in gzip', (t) => {
   const dist = join(root, 'www/dist');
   const scripts = readdirSync(dist, { recursive: true }).filter((name) => name.endsWith('.js') && !name.endsWith('engine.js'));

@@ -27,7 +27,7 @@ import torch
 from net_torch import VOXEL_M, Cameras, Ipdrecon
 
 REPOSITORY = pathlib.Path(__file__).parents[2]
-# From here on as in crate/cli/src/table/efficiency.rs.
+# From here on as in crate/bench/src.
 EDGE = 40
 WARM_UP, RUNS = 2, 9
 

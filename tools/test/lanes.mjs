@@ -49,7 +49,7 @@ async function wasmClippy() {
 export const lanes = {
   fmt: async () => [cargo(buildEnv(), 'fmt', '--all', '--check')],
   types: async () => [check(process.execPath, tsc, '--noEmit', '-p', 'tsconfig.json')],
-  tools: async () => [nodeTests('tools', 'tools/test')],
+  tools: async () => [nodeTests('tools', 'tools/bench', 'tools/test')],
   clippy: async () => [cargo(buildEnv(), 'clippy', '--locked', '--release', '--workspace', '--all-targets', '--', '-D', 'warnings'), await wasmClippy()],
   native: async () => [{ ...cargo(gpu(buildEnv()), 'test', '--release', '--workspace', '--no-fail-fast', '--', '--show-output'), count: 'cargo' }],
   build: async () => [check(process.execPath, 'tools/build.mjs')],

@@ -1,6 +1,6 @@
 /** Says what goes on: every change to the eye, and to the ear only as often as one can listen. */
 import type { Event as EngineEvent, PlanSummary, StageName } from "./engine.js";
-import { count, counted, stageTitle } from "./words.js";
+import { amount, count, counted, stageTitle } from "./words.js";
 
 /** Progress is spoken at each of these shares of the work. */
 const SPOKEN_SHARE = 0.25;
@@ -24,6 +24,9 @@ export class Announcer {
       case "planned":
         this.#both(planned(event.plan));
         break;
+      case "weights":
+        this.#both(`The weights ${event.name} are in use.`);
+        break;
       case "stage":
         this.#stage = event.stage;
         this.#spoken = 0;
@@ -46,6 +49,9 @@ export class Announcer {
       case "failed":
         this.#both(`${event.message} ${event.advice}`);
         break;
+      case "finding":
+        if (event.finding.code === "device-lost") this.#both(`${event.finding.found} ${event.finding.advice}`);
+        break;
       case "exported":
         this.status.textContent = `${event.fileName} is ready.`;
         break;
@@ -56,8 +62,8 @@ export class Announcer {
   }
 
   #progress(done: number, total: number, triangles: number): void {
-    const words = total > 0 ? `${stageTitle(this.#stage)}: ${count(done)} of ${count(total)}` : stageTitle(this.#stage);
-    this.caption.textContent = `${words}, ${counted(triangles, "triangle")}.`;
+    const words = total > 0 ? `${stageTitle(this.#stage)}: ${amount(this.#stage, done, total)}` : stageTitle(this.#stage);
+    this.caption.textContent = triangles > 0 ? `${words}, ${counted(triangles, "triangle")}.` : `${words}.`;
     const share = total > 0 ? Math.floor(done / total / SPOKEN_SHARE) : 0;
     if (share <= this.#spoken) return;
     this.#spoken = share;
@@ -71,6 +77,6 @@ export class Announcer {
 }
 
 function planned({ keyframes, frames, depth }: PlanSummary): string {
-  const source = depth === "stereo" ? ", depth will be estimated from the photos" : "";
+  const source = depth === "sensor" ? "" : `, ${depth === "stereo" ? "depth will be estimated" : "the network will work"} from the photos`;
   return `Planned: ${count(keyframes)} of ${counted(frames, "frame")} kept${source}.`;
 }

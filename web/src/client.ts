@@ -14,7 +14,10 @@ import type {
   Request,
   RunOptions,
   ViewOptions,
+  WeightsAddress,
 } from "./engine.js";
+import { Deferred } from "./deferred.js";
+import { Work } from "./work.js";
 import type { FromWorker, ToWorker } from "./worker.js";
 
 /** One of the engine's events by its name. */
@@ -39,6 +42,8 @@ export interface ReconstructorOptions {
   pixelRatio?: number;
   /** `auto` takes WebGPU if it is there. */
   device?: DeviceChoice;
+  /** Another place for the network's weights than beside the worker script, and what they must hash to. */
+  weights?: WeightsAddress;
   /** Another place for the worker script, for hosts that move files. It must be of the page's own origin. */
   workerUrl?: string | URL;
 }
@@ -47,7 +52,7 @@ export interface ReconstructorOptions {
 export class ReconstructionError extends Error {
   override readonly name = "ReconstructionError";
   constructor(
-    /** `noWebgpu`, `scan`, `memory`, `device`, `internal`, `export` or `disposed`. */
+    /** `noWebgpu`, `scan`, `weights`, `memory`, `device`, `internal`, `export` or `disposed`. */
     readonly code: string,
     message: string,
     /** What to try. */
@@ -72,6 +77,9 @@ export interface Reconstructor {
   ): void;
 }
 
+/** Failures after which the engine takes requests as before. */
+const SURVIVED: ReadonlySet<string> = new Set(["scan", "weights", "export"]);
+
 /** The sample room that is shown unless another is asked for. */
 export const SAMPLE_SEED = 3;
 
@@ -82,6 +90,7 @@ export class Reconstructor extends EventTarget {
   readonly #worker: Worker;
   readonly #ready = new Deferred<EventOf<"ready">>();
   readonly #exports = new Map<number, Deferred<File>>();
+  readonly #work = new Work();
   #plan?: Deferred<PlanSummary>;
   #run?: Deferred<EventOf<"finished">>;
   #lastPlan?: PlanSummary;
@@ -90,7 +99,7 @@ export class Reconstructor extends EventTarget {
   #alive = true;
   #lastId = 0;
 
-  constructor({ canvas, widthPx = 1, heightPx = 1, pixelRatio = 1, device = "auto", workerUrl }: ReconstructorOptions = {}) {
+  constructor({ canvas, widthPx = 1, heightPx = 1, pixelRatio = 1, device = "auto", weights, workerUrl }: ReconstructorOptions = {}) {
     super();
     this.ready = this.#ready.promise;
     if (workerUrl !== undefined) {
@@ -105,7 +114,7 @@ export class Reconstructor extends EventTarget {
       this.#fail("internal", `The worker script could not be run${event.message ? ` (${event.message})` : ""}.`, "Check the connection and reload the page.");
     };
     const offscreen = canvas && "transferControlToOffscreen" in canvas ? canvas.transferControlToOffscreen() : canvas;
-    const request: Request = { type: "start", widthPx, heightPx, pixelRatio, device };
+    const request: Request = { type: "start", widthPx, heightPx, pixelRatio, device, weights };
     this.#send({ request, canvas: offscreen }, offscreen ? [offscreen] : []);
   }
 
@@ -140,6 +149,31 @@ export class Reconstructor extends EventTarget {
   /** Opens the sample room that is made by rule. */
   openSample(seed = SAMPLE_SEED): Promise<PlanSummary> {
     return this.#openWith(undefined, seed);
+  }
+
+  /**
+   * Takes over from one that ended in the middle of its work, such as for a lost device: opens the same scan, with the same
+   * weights and options, and goes on after the last stage that was finished. Settles with the plan; promises that the other gave
+   * for its plan and its run are kept by this one.
+   */
+  async takeOver(lost: Reconstructor): Promise<PlanSummary> {
+    const { toOpen, toRun } = lost.#work;
+    if (toOpen.length === 0) throw nothingOpen();
+    this.#run = lost.#run;
+    const plan = (this.#plan = lost.#plan ?? new Deferred());
+    lost.#plan = lost.#run = undefined;
+    this.#findings = [];
+    this.#enter("opening");
+    for (const message of toOpen) this.#send(message);
+    const planned = await plan.promise;
+    for (const message of toRun) this.#send(message);
+    if (toRun.length > 0) this.#enter("running");
+    return planned;
+  }
+
+  /** Takes a file of weights for the network from now on. It is read in place, and told by `weights` or `failed`. */
+  useWeights(file: File): void {
+    this.#send({ request: { type: "useWeights" }, files: [file] });
   }
 
   /** Plans again with other options, without starting. What is left out stays as it was. */
@@ -265,7 +299,9 @@ export class Reconstructor extends EventTarget {
   }
 
   #send(message: ToWorker, transfer: Transferable[] = []): void {
-    if (this.#alive) this.#worker.postMessage(message, transfer);
+    if (!this.#alive) return;
+    this.#work.asked(message);
+    this.#worker.postMessage(message, transfer);
   }
 
   #receive({ event, payload }: FromWorker): void {
@@ -274,6 +310,7 @@ export class Reconstructor extends EventTarget {
       this.#exports.delete(event.id);
       answer?.resolve(new File(payload ? [payload] : [], event.fileName, { type: event.mime }));
     }
+    this.#work.told(event, payload);
     this.#happen(event);
   }
 
@@ -304,7 +341,7 @@ export class Reconstructor extends EventTarget {
         this.#findings.push(event.finding);
         break;
       case "failed":
-        if (event.code !== "scan" && event.code !== "export") this.#alive = false;
+        if (!SURVIVED.has(event.code)) this.#alive = false;
         if (event.code !== "export") this.#enter("failed");
         break;
     }
@@ -345,20 +382,6 @@ export class Reconstructor extends EventTarget {
   #rejectExports(error: ReconstructionError): void {
     for (const answer of this.#exports.values()) answer.reject(error);
     this.#exports.clear();
-  }
-}
-
-/** A promise that is settled from outside. Nobody has to listen to it: every failure is also an event. */
-class Deferred<T> {
-  readonly promise: Promise<T>;
-  resolve!: (value: T) => void;
-  reject!: (error: Error) => void;
-  constructor() {
-    this.promise = new Promise((resolve, reject) => {
-      this.resolve = resolve;
-      this.reject = reject;
-    });
-    this.promise.catch(() => undefined);
   }
 }
 

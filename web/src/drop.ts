@@ -69,6 +69,13 @@ export function collect(from: Droppable): Promise<Dropped> {
   return gather(roots);
 }
 
+/** The file of weights that alone was dropped or picked, if that is so. Call it in the handler itself, as {@link collect}. */
+export function weightsOf(from: Droppable): (() => Promise<File>) | undefined {
+  if (!(from instanceof DataTransfer) && !Array.isArray(from)) return undefined;
+  const [only, ...others] = rootsOf(from);
+  return only?.kind === "file" && others.length === 0 && /\.safetensors$/i.test(only.path) ? only.read : undefined;
+}
+
 async function gather(roots: Node[]): Promise<Dropped> {
   const only = roots.length === 1 ? roots[0] : undefined;
   if (only?.kind === "file" && isZip(only.path)) {

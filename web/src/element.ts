@@ -3,8 +3,8 @@
  * keys, speaks to screen readers, and tells the page everything by DOM events. Panels and buttons are the page's own.
  */
 import { ReconstructionError, Reconstructor, type EventOf, type State } from "./client.js";
-import type { Droppable } from "./drop.js";
-import type { Event as EngineEvent, LookAt, MeshFormat, PlanSummary, RunOptions, ShadingMode } from "./engine.js";
+import { weightsOf, type Droppable } from "./drop.js";
+import type { DeviceChoice, Event as EngineEvent, FindingMessage, LookAt, MeshFormat, PlanSummary, PresetName, RunOptions, ShadingMode, WeightsAddress } from "./engine.js";
 import { forwardInput, pixelSize } from "./input.js";
 import { preflight } from "./preflight.js";
 import { Announcer } from "./announcer.js";
@@ -22,10 +22,16 @@ export interface OpenOptions {
 }
 
 const FORWARDED: readonly EngineEvent["type"][] = [
-  "ready", "opened", "planned", "stage", "progress", "bricks", "paused", "resumed", "finished", "finding", "failed",
-  "exported", "cameraChanged",
+  "ready", "opened", "weights", "planned", "stage", "progress", "bricks", "paused", "resumed", "finished", "finding", "failed",
+  "kept", "exported", "cameraChanged",
 ];
-const SHADINGS: readonly ShadingMode[] = ["color", "normal", "wireframe", "depth"];
+/** Failures of the engine itself, after which another can go on. */
+const LOST: ReadonlySet<string> = new Set(["device", "internal"]);
+/** After the last of these the processor goes on, which cannot be lost. */
+const MOST_LOSSES = 2;
+const DEVICES: readonly DeviceChoice[] = ["auto", "cpu", "gpu"];
+const PRESETS: readonly PresetName[] = ["small", "medium", "full"];
+const SHADINGS: readonly ShadingMode[] = ["color", "normal", "wireframe", "depth", "confidence", "views"];
 
 export interface IpdReconElement {
   addEventListener<K extends keyof (IpdReconEventMap & HTMLElementEventMap)>(
@@ -37,10 +43,11 @@ export interface IpdReconElement {
 }
 
 /**
- * Attributes: `theme` (`light`, `dark`; otherwise the system's), `shading` (`color`, `normal`, `wireframe`, `depth`), `cameras`,
+ * Attributes: `theme` (`light`, `dark`; otherwise the system's), `shading` (`color`, `normal`, `wireframe`, `depth`, `confidence`, `views`), `cameras`,
  * `back-faces`, `review` (wait after the plan), `voxel-size` and `max-depth` (metres), `every` (n-th keyframe), `views` (so many
- * keyframes, spread evenly), `depth` (`sensor`, `stereo`; otherwise what the scan has), `stereo-size` (`320x240`), `label` (what
- * screen readers call it); and, read when it is put into the page, `device` (`cpu`) and `worker-src`.
+ * keyframes, spread evenly), `depth` (`sensor`, `stereo`, `network`; otherwise what the scan has), `stereo-size` (`320x240`), `preset` (of the
+ * network: `small`, `medium`, `full`), `label` (what screen readers call it); and, read when it is put into the page, `device`
+ * (`cpu`; `gpu`, which uses even an adapter that is software), `weights` and `weights-sha256` (another file for the network, and its hash) and `worker-src`.
  */
 export class IpdReconElement extends HTMLElement {
   static readonly observedAttributes = ["theme", "shading", "cameras", "back-faces", "label"];
@@ -53,6 +60,10 @@ export class IpdReconElement extends HTMLElement {
   #canvas?: HTMLCanvasElement;
   #connection?: AbortController;
   #state: State = "starting";
+  /** Engines that were lost in the middle of the scan that is open. */
+  #losses = 0;
+  /** It was the hidden page that held the run, not the visitor. */
+  #heldByHiding = false;
 
   /** The engine behind the element, for everything that has no method here. Replaced by {@link restart}. */
   get reconstructor(): Reconstructor | undefined {
@@ -80,6 +91,11 @@ export class IpdReconElement extends HTMLElement {
   /** Puts a new engine and a new canvas in the place of the old ones. Everything not exported is gone. */
   restart(): void {
     this.#stop();
+    this.#losses = 0;
+    this.#start(this.#device());
+  }
+
+  #start(device: DeviceChoice): void {
     const signal = (this.#connection = new AbortController()).signal;
     const [shortcoming] = preflight();
     if (shortcoming) {
@@ -98,29 +114,39 @@ export class IpdReconElement extends HTMLElement {
     const client = (this.#client = new Reconstructor({
       canvas,
       ...pixelSize(canvas),
-      device: this.getAttribute("device") === "cpu" ? "cpu" : "auto",
+      device,
+      weights: this.#weights(),
       workerUrl: this.getAttribute("worker-src") ?? undefined,
     }));
-    for (const type of FORWARDED) client.addEventListener(type, (event) => this.#tell((event as CustomEvent<EngineEvent>).detail), { signal });
-    client.addEventListener("state", ({ detail }) => this.#enter(detail), { signal });
+    for (const type of FORWARDED) client.addEventListener(type, (event) => this.#take((event as CustomEvent<EngineEvent>).detail), { signal });
+    // A failure comes as an event right after: it may be one that is survived.
+    client.addEventListener("state", ({ detail }) => void (detail !== "failed" && this.#enter(detail)), { signal });
     this.#view();
     forwardInput(canvas, (input) => client.input(input), () => this.#showsSomething(), signal);
     this.#takeDrops(signal);
     this.#dark.addEventListener("change", () => this.#view(), { signal });
     this.#still.addEventListener("change", () => this.#view(), { signal });
+    document.addEventListener("visibilitychange", () => this.#hide(document.hidden), { signal });
   }
 
   /**
    * Opens a dropped or picked folder or .zip, plans, and runs the plan unless told to wait. Call it in the event's handler
-   * itself. Settles with the plan.
+   * itself. Settles with the plan. A single .safetensors file is taken as the network's weights, for the next run.
    */
   open(input: Droppable, options?: OpenOptions): Promise<PlanSummary> {
+    const weights = weightsOf(input);
+    if (weights) return this.#takeWeights(weights);
     return this.#begin((client) => client.open(input), options);
   }
 
   /** Opens the sample room that is made by rule. */
   openSample(seed?: number, options?: OpenOptions): Promise<PlanSummary> {
     return this.#begin((client) => client.openSample(seed), options);
+  }
+
+  /** Takes a file of weights for the network, from the next run on. */
+  useWeights(file: File): void {
+    this.#engine().useWeights(file);
   }
 
   /** Plans again with other options. */
@@ -178,6 +204,25 @@ export class IpdReconElement extends HTMLElement {
     return plan;
   }
 
+  /** The plan that is there stays: weights change what a run makes, not what it does. */
+  async #takeWeights(read: () => Promise<File>): Promise<PlanSummary> {
+    const client = this.#engine();
+    client.useWeights(await read());
+    return client.plan ?? Promise.reject(new ReconstructionError("scan", "The weights are taken; no scan is open.", "Drop a scan."));
+  }
+
+  /** Where the attributes say to work. */
+  #device(): DeviceChoice {
+    return DEVICES.find((device) => device === this.getAttribute("device")) ?? "auto";
+  }
+
+  /** Where the attributes say that weights lie. */
+  #weights(): WeightsAddress | undefined {
+    const address = this.getAttribute("weights");
+    if (address === null) return undefined;
+    return { url: new URL(address, document.baseURI).href, sha256: this.getAttribute("weights-sha256")?.toLowerCase() };
+  }
+
   /** What the attributes ask for. */
   #options(): Partial<RunOptions> {
     const number = (name: string): number | undefined => {
@@ -191,7 +236,8 @@ export class IpdReconElement extends HTMLElement {
       every: number("every"),
       views: number("views"),
       maxDepthM: number("max-depth"),
-      depth: depth === "sensor" || depth === "stereo" ? depth : undefined,
+      depth: depth === "sensor" || depth === "stereo" || depth === "network" ? depth : undefined,
+      preset: PRESETS.find((preset) => preset === this.getAttribute("preset")),
       stereoSize: width && height ? { widthPx: Number(width), heightPx: Number(height) } : undefined,
     };
     return Object.fromEntries(Object.entries(all).filter(([, value]) => value !== undefined));
@@ -203,10 +249,43 @@ export class IpdReconElement extends HTMLElement {
   }
 
   #stop(): void {
-    this.#connection?.abort();
     this.#client?.dispose();
+    this.#detach();
+  }
+
+  /** Lets go of an engine and its canvas. */
+  #detach(): void {
+    this.#connection?.abort();
     this.#canvas?.remove();
     this.#client = this.#canvas = this.#connection = undefined;
+  }
+
+  #take(event: EngineEvent): void {
+    if (event.type !== "failed") return this.#tell(event);
+    if (LOST.has(event.code) && this.#goOn(event)) return;
+    if (event.code !== "export") this.#enter("failed");
+    this.#tell(event);
+  }
+
+  /** Lets another engine go on with the work of one that was lost; the processor takes it where graphics devices fail again. */
+  #goOn({ message }: EventOf<"failed">): boolean {
+    const lost = this.#client;
+    if (!lost || !["running", "paused", "finished"].includes(this.#state) || this.#losses === MOST_LOSSES) return false;
+    const device = this.#losses === 0 ? this.#device() : "cpu";
+    this.#losses += 1;
+    this.#detach();
+    this.#start(device);
+    this.#engine().takeOver(lost).then(() => this.#tellLoss(message), () => undefined);
+    lost.dispose();
+    return true;
+  }
+
+  #tellLoss(found: string): void {
+    const expected = "a graphics device that lasts for the whole run";
+    const advice = "The run goes on after the last stage that was finished. If it happens again, close what else uses the graphics card, or choose a smaller preset or larger voxels.";
+    const finding: FindingMessage = { severity: "warning", code: "device-lost", file: undefined, line: undefined, expected, found, advice };
+    this.#tell({ type: "finding", finding });
+    this.#hide(document.hidden);
   }
 
   #tell(event: EngineEvent): void {
@@ -224,6 +303,17 @@ export class IpdReconElement extends HTMLElement {
 
   #showsSomething(): boolean {
     return this.#state === "running" || this.#state === "paused" || this.#state === "finished";
+  }
+
+  /** A page that nobody sees leaves the machine to those that somebody does. */
+  #hide(hidden: boolean): void {
+    if (hidden && this.#state === "running") {
+      this.#heldByHiding = true;
+      this.pause();
+    } else if (!hidden && this.#heldByHiding) {
+      this.#heldByHiding = false;
+      this.resume();
+    }
   }
 
   #label(): void {

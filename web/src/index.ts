@@ -8,7 +8,7 @@ export * from "./client.js";
 export { collect, DropError, type Droppable, type Dropped, type Unreadable } from "./drop.js";
 export { defineIpdRecon, IpdReconElement, type IpdReconEventMap, type OpenOptions } from "./element.js";
 export { preflight, type Shortcoming } from "./preflight.js";
-export { count, counted, stageOrder, stageTitle } from "./words.js";
+export { amount, count, counted, stageOrder, stageTitle } from "./words.js";
 export type {
   DepthSource,
   DeviceChoice,
@@ -19,11 +19,13 @@ export type {
   MeshFormat,
   PixelSize,
   PlanSummary,
+  PresetName,
   Request as EngineRequest,
   RunOptions,
   ShadingMode,
   StageName,
   ViewOptions,
+  WeightsAddress,
 } from "./engine.js";
 
 /** The version of this package. */

@@ -3,6 +3,7 @@ import type { DepthSource, StageName } from "./engine.js";
 
 const STAGES: Record<StageName, string> = {
   opening: "Reading the scan",
+  downloading: "Fetching the network",
   warmingUp: "Warming up",
   matching: "Matching views",
   fusing: "Fusing depth",
@@ -17,17 +18,24 @@ const STAGES: Record<StageName, string> = {
 const WORK: Record<DepthSource, readonly StageName[]> = {
   sensor: ["fusing"],
   stereo: ["matching"],
-  network: ["features", "coarse", "medium", "fine", "coloring"],
+  network: ["features", "matching", "coarse", "medium", "fine", "coloring"],
 };
 
 /** The stages in the order in which they come. */
 export function stageOrder(depth: DepthSource = "sensor"): readonly StageName[] {
-  return ["opening", "warmingUp", ...WORK[depth], "meshing"];
+  return ["opening", ...(depth === "network" ? ["downloading" as const] : []), "warmingUp", ...WORK[depth], "meshing"];
 }
 
 /** A stage in words. */
 export function stageTitle(stage: StageName): string {
   return STAGES[stage];
+}
+
+/** How much of a stage is done, in what it is counted in. */
+export function amount(stage: StageName, done: number, total: number): string {
+  if (stage !== "downloading") return `${count(done)} of ${count(total)}`;
+  const megabytes = (bytes: number): string => (bytes / 1e6).toFixed(1);
+  return `${megabytes(done)} of ${megabytes(total)} MB`;
 }
 
 /** A count in the reader's own way of writing numbers. */

@@ -1,10 +1,11 @@
 //! Between the messages and the rooms' own types.
 
 use crate::messages::{
-    DepthSource, FindingMessage, InputEvent, PixelSize, PlanSummary, RunOptions, ShadingMode,
-    StageName, ViewOptions,
+    DepthSource, FindingMessage, InputEvent, PixelSize, PlanSummary, PresetName, RunOptions,
+    ShadingMode, StageName, ViewOptions,
 };
-use recon::{Level, NetworkConfig, Options, Plan, Stage};
+use crate::platform;
+use recon::{Level, NetworkConfig, Options, Plan, Preset, Rates, Stage};
 use scan::{Finding, Gravity, GravitySource};
 use stereo::StereoConfig;
 use view::{Input, Look, PointerKind, Shading, Theme};
@@ -21,9 +22,26 @@ pub fn options(message: RunOptions) -> Options {
                 size: (message.stereo_size.width_px, message.stereo_size.height_px),
                 ..StereoConfig::default()
             }),
-            DepthSource::Network => recon::DepthSource::Network(NetworkConfig::default()),
+            DepthSource::Network => recon::DepthSource::Network(preset(message.preset).config()),
         }),
     }
+}
+
+fn preset(name: PresetName) -> Preset {
+    match name {
+        PresetName::Small => Preset::Small,
+        PresetName::Medium => Preset::Medium,
+        PresetName::Full => Preset::Full,
+    }
+}
+
+/// The preset that a configuration came from.
+fn preset_name(config: &NetworkConfig) -> PresetName {
+    let all = [PresetName::Medium, PresetName::Full];
+    let found = all
+        .into_iter()
+        .find(|&name| preset(name).config() == *config);
+    found.unwrap_or_default()
 }
 
 /// What a plan was made with, as the page would ask for it again.
@@ -43,6 +61,10 @@ pub fn run_options(plan: &Plan) -> RunOptions {
             width_px,
             height_px,
         },
+        preset: match &plan.depth {
+            recon::DepthSource::Network(config) => preset_name(config),
+            recon::DepthSource::Sensor | recon::DepthSource::Stereo(_) => PresetName::default(),
+        },
     }
 }
 
@@ -54,15 +76,23 @@ fn depth_source(source: recon::DepthSource) -> DepthSource {
     }
 }
 
-pub fn plan_summary(plan: &Plan) -> PlanSummary {
+/// A plan for the page. `apart` says that the network works on the processor while the rest has a device of its own.
+pub fn plan_summary(plan: &Plan, apart: bool, rates: Option<Rates>) -> PlanSummary {
+    let (device_bytes, heap_bytes) = match apart {
+        true => (plan.device_bytes, plan.heap_bytes + plan.network_bytes),
+        false => (plan.device_bytes + plan.network_bytes, plan.heap_bytes),
+    };
     PlanSummary {
         options: run_options(plan),
         depth: depth_source(plan.depth),
         frames: plan.frames as u32,
         keyframes: plan.keyframes.len() as u32,
         bricks: plan.bricks as u32,
-        device_bytes: plan.device_bytes as f64,
-        heap_bytes: plan.heap_bytes as f64,
+        device_bytes: device_bytes as f64,
+        // What the engine holds already stays.
+        heap_bytes: heap_bytes as f64 + platform::heap_bytes(),
+        expected_s: rates.map(|rates| plan.work.seconds(&rates)),
+        download_bytes: None,
         remarks: plan.remarks.clone(),
     }
 }
@@ -114,6 +144,8 @@ pub fn look(view: ViewOptions, floor_height_m: f32) -> Look {
             ShadingMode::Normal => Shading::Normal,
             ShadingMode::Wireframe => Shading::Wireframe,
             ShadingMode::Depth => Shading::Depth,
+            ShadingMode::Confidence => Shading::Confidence,
+            ShadingMode::Views => Shading::Views,
         },
         theme: if view.dark { Theme::DARK } else { Theme::LIGHT },
         cull_back: !view.back_faces,

@@ -1,12 +1,17 @@
 //! What the engine's tasks share: the device, the stage, the scan, its plan and volume, and where a run stands.
 
 use crate::{
-    convert, handoff,
+    convert,
+    device::Found,
+    given::Given,
+    handoff,
     messages::{DeviceChoice, Event, InputEvent, LookAt, ViewOptions},
     platform,
-    stage::{Bricks, Gpu, Stage},
+    rates::Measured,
+    stage::{Bricks, Stage},
+    weights::Weights,
 };
-use burn::tensor::{Device, wgpu::WgpuSetup};
+use burn::tensor::Device;
 use glam::{Vec2, Vec3};
 use js_sys::{Function, Uint8Array};
 use recon::{Limits, Plan};
@@ -21,12 +26,8 @@ use volume::{BrickMeshes, Volume, VolumeError};
 use wasm_bindgen::JsValue;
 use web_sys::OffscreenCanvas;
 
-/// The largest binding that is used even where more is allowed.
-const BINDING_BYTES: u64 = 1 << 30;
 /// While a run is on and nobody touches the view, this long between two pictures leaves the device to the run.
 const RUN_FRAME_MS: f64 = 200.0;
-/// The device takes this many of burn's tasks at a time: small submits keep the page's frames coming.
-const TASKS_A_SUBMIT: usize = 16;
 
 /// Where a run stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,11 +43,18 @@ pub enum RunState {
 pub struct Engine {
     emit: Function,
     pub device: Device,
+    /// Where the network works: a processor that plays GPU is slower at that than the processor itself.
+    pub network_device: Device,
     pub limits: Limits,
+    pub weights: Weights,
+    /// How fast it is; `None` until that is measured.
+    pub rates: Cell<Measured>,
     stage: RefCell<Option<Stage>>,
     scan: RefCell<Option<Rc<Scan>>>,
     plan: RefCell<Option<Rc<Plan>>>,
     volume: RefCell<Option<Rc<Volume>>>,
+    /// What stages of an earlier run made, for the next.
+    pub given: Given,
     state: Cell<RunState>,
     frame_asked: Cell<bool>,
     last_frame_ms: Cell<f64>,
@@ -62,96 +70,44 @@ impl Engine {
         canvas: Option<OffscreenCanvas>,
         choice: DeviceChoice,
         emit: Function,
-    ) -> Result<Self, JsValue> {
-        let mut adapter = "burn flex, one thread".to_owned();
-        let mut note = "The processor does the work, as was asked for";
-        if choice == DeviceChoice::Auto {
-            let options = Device::wgpu_options().tasks_max(TASKS_A_SUBMIT);
-            match options.init_with_setup_async().await {
-                Ok((device, setup)) => {
-                    return Self::on_gpu(canvas, device, setup, emit).map_err(JsValue::from);
-                }
-                Err(error) => {
-                    // Words for the report; the visitor is told what it means.
-                    adapter = format!("{adapter}; {error}");
-                    note = "This browser offers no WebGPU: the processor does the work, which takes longer";
-                }
-            }
-        }
-        let stage = canvas.map(Stage::on_cpu).transpose()?;
-        let engine = Self::new(emit, Device::flex(), Limits::default(), stage);
-        engine.emit(&Event::Ready {
-            device: "cpu".to_owned(),
-            adapter,
-            note: Some(note.to_owned()),
-        });
-        Ok(engine)
-    }
-
-    fn on_gpu(
-        canvas: Option<OffscreenCanvas>,
-        device: Device,
-        setup: WgpuSetup,
-        emit: Function,
+        weights: Weights,
     ) -> Result<Self, String> {
-        let info = setup.adapter.get_info();
-        let words = format!("{} {}", info.name, info.driver);
-        let words_lower = words.to_lowercase();
-        let is_software = ["swiftshader", "llvmpipe", "lavapipe"]
-            .iter()
-            .any(|name| words_lower.contains(name))
-            || info.device_type == wgpu::DeviceType::Cpu;
-        let binding_bytes = setup.device.limits().max_storage_buffer_binding_size;
-        let limits = Limits {
-            binding_bytes: binding_bytes.min(BINDING_BYTES) as usize,
-        };
-        let lost = emit.clone();
-        setup
-            .device
-            .set_device_lost_callback(move |reason, message| {
-                let event = Event::Failed {
-                    code: "device".to_owned(),
-                    message: format!("The graphics device was lost ({reason:?}: {message})"),
-                    advice: "Start again, with larger voxels if it happens again.".to_owned(),
-                };
-                if let Ok(event) = event.into_js() {
-                    let _ = lost.call1(&JsValue::NULL, &event);
-                }
-            });
-        let gpu = Gpu {
-            instance: setup.instance,
-            adapter: setup.adapter,
-            device: setup.device,
-            queue: setup.queue,
-            is_software,
-        };
-        let stage = canvas
-            .map(|canvas| Stage::on_gpu(canvas, gpu))
-            .transpose()?;
-        let engine = Self::new(emit, device, limits, stage);
-        engine.emit(&Event::Ready {
-            device: "webgpu".to_owned(),
-            adapter: words.trim().to_owned(),
-            note: None,
+        let Found {
+            device,
+            network_device,
+            limits,
+            gpu,
+            ready,
+        } = Found::of(choice, &emit).await;
+        let stage = canvas.map(|canvas| match gpu {
+            Some(gpu) => Stage::on_gpu(canvas, gpu),
+            None => Stage::on_cpu(canvas),
         });
-        Ok(engine)
-    }
-
-    fn new(emit: Function, device: Device, limits: Limits, stage: Option<Stage>) -> Self {
-        Self {
+        let engine = Self {
             emit,
             device,
+            network_device,
             limits,
-            stage: RefCell::new(stage),
+            weights,
+            rates: Cell::default(),
+            stage: RefCell::new(stage.transpose()?),
             scan: RefCell::default(),
             plan: RefCell::default(),
             volume: RefCell::default(),
+            given: Given::default(),
             state: Cell::new(RunState::Idle),
             frame_asked: Cell::new(false),
             last_frame_ms: Cell::new(0.0),
             moving_since_ms: Cell::new(None),
             touched: Cell::new(false),
-        }
+        };
+        engine.emit(&ready);
+        Ok(engine)
+    }
+
+    /// Whether the network works on another device than the volume.
+    pub fn network_is_apart(&self) -> bool {
+        self.network_device != self.device
     }
 
     /// Tells the page.
@@ -211,6 +167,14 @@ impl Engine {
     pub fn begin(self: &Rc<Self>, brick_size_m: f32) {
         self.set_state(RunState::Running);
         self.volume.take();
+        self.on_stage(|stage| {
+            stage.clear(brick_size_m);
+            stage.controls.home();
+        });
+    }
+
+    /// Clears the stage for bricks of another size; the visitor stays where they are.
+    pub fn replace_bricks(self: &Rc<Self>, brick_size_m: f32) {
         self.on_stage(|stage| stage.clear(brick_size_m));
     }
 
@@ -221,6 +185,7 @@ impl Engine {
     pub fn set_scan(&self, scan: Scan) {
         self.volume.take();
         self.plan.take();
+        self.given.clear();
         self.scan.replace(Some(Rc::new(scan)));
     }
 

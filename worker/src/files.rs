@@ -1,8 +1,9 @@
 //! The visitor's files as a scan's source: read in place when they are needed, never all at once.
 
 use js_sys::{Array, Uint8Array};
+use net::weights::WeightsFile;
 use scan::{Entry, RandomRead, Source, SourceError};
-use std::{collections::HashMap, io};
+use std::{collections::HashMap, io, ops::Range};
 use wasm_bindgen::JsCast;
 use web_sys::{Blob, File, FileReaderSync};
 
@@ -87,7 +88,20 @@ impl RandomRead for DroppedZip {
     }
 }
 
-fn read_range(file: &File, offset: u64, len: usize) -> io::Result<Vec<u8>> {
+/// Weights as a file or a part of the browser's cache.
+pub struct WeightsBlob(pub Blob);
+
+impl WeightsFile for WeightsBlob {
+    fn len(&self) -> usize {
+        self.0.size() as usize
+    }
+
+    fn read(&self, range: Range<usize>) -> io::Result<Vec<u8>> {
+        read_range(&self.0, range.start as u64, range.len())
+    }
+}
+
+fn read_range(file: &Blob, offset: u64, len: usize) -> io::Result<Vec<u8>> {
     let end = offset as f64 + len as f64;
     let part = file.slice_with_f64_and_f64(offset as f64, end);
     let bytes = read(&part.map_err(|error| failed(&error))?)?;
@@ -101,7 +115,7 @@ fn read_range(file: &File, offset: u64, len: usize) -> io::Result<Vec<u8>> {
 }
 
 /// The whole of a file or of a part of one. A worker may wait for it; a page may not.
-fn read(blob: &Blob) -> io::Result<Vec<u8>> {
+pub fn read(blob: &Blob) -> io::Result<Vec<u8>> {
     let reader = FileReaderSync::new().map_err(|error| failed(&error))?;
     let buffer = reader.read_as_array_buffer(blob);
     let buffer = buffer.map_err(|error| failed(&error))?;

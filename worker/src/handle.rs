@@ -6,6 +6,8 @@ use crate::{
     files::{DroppedFolder, DroppedZip},
     job::{self, Origin},
     messages::{InputEvent, Request},
+    rates,
+    weights::Weights,
 };
 use js_sys::{Array, Function};
 use std::rc::Rc;
@@ -20,7 +22,8 @@ pub struct Handle(Rc<Engine>);
 
 #[wasm_bindgen(js_class = Engine)]
 impl Handle {
-    /// Finds a device and starts the engine on it. `emit` is called with every event, and with the bytes beside it.
+    /// Finds a device and starts the engine on it. `emit` is called with every event, and with the bytes beside it; `bring` when
+    /// the network's weights are needed, with a function that is told the bytes done and in all: it promises a `Blob`.
     ///
     /// # Errors
     /// When neither WebGPU nor the CPU can be used, or `request` is not `start`.
@@ -28,23 +31,25 @@ impl Handle {
         canvas: Option<OffscreenCanvas>,
         request: Ts<Request>,
         emit: Function,
+        bring: Function,
     ) -> Result<Handle, JsValue> {
-        console_error_panic_hook::set_once();
         let Request::Start {
             width_px,
             height_px,
             pixel_ratio,
             device,
+            ..
         } = read(&request)?
         else {
             return Err(js_sys::Error::new("the first message must be `start`").into());
         };
-        let engine = Rc::new(Engine::find(canvas, device, emit).await?);
+        let engine = Rc::new(Engine::find(canvas, device, emit, Weights::new(bring)).await?);
         engine.input(InputEvent::Resize {
             width_px,
             height_px,
             pixel_ratio,
         });
+        spawn_local(rates::measure(engine.clone()));
         Ok(Handle(engine))
     }
 
@@ -68,6 +73,16 @@ impl Handle {
             }
             Request::OpenSample { seed } => {
                 spawn_local(job::open(engine, Origin::Sample(seed)));
+            }
+            Request::UseWeights => {
+                if let Ok(file) = files.get(0).dyn_into::<File>() {
+                    engine.weights.use_file(&engine, file);
+                }
+            }
+            Request::Keep { stage } => {
+                if let Ok(file) = files.get(0).dyn_into::<File>() {
+                    engine.given.put(stage, file.into());
+                }
             }
             Request::Replan { options } => {
                 job::plan(&engine, convert::options(options));

@@ -5,26 +5,20 @@ use crate::{
     engine::{Engine, RunState},
     files::{DroppedFolder, DroppedZip},
     messages::{Event, FindingMessage, MeshFormat, RunOptions, StageName},
-    platform,
+    platform, rates,
+    sink::PageSink,
+    weights::Fault,
 };
-use glam::Vec3;
 use js_sys::{Promise, Uint8Array};
-use recon::{DepthSource, Flow, Options, RunError, Sink, Stage};
-use scan::{Finding, Scan, ScanError, Source, ZipSource};
+use recon::{DepthSource, Options, Preset, RunError};
+use scan::{Scan, ScanError, Source, ZipSource};
 use std::rc::Rc;
 use stereo::StereoError;
 use view::CameraPose;
-use volume::{BrickMeshes, VolumeError};
+use volume::VolumeError;
 use wasm_bindgen::JsValue;
 use wasm_bindgen_futures::JsFuture;
 use web_sys::{Blob, ImageEncodeOptions};
-
-/// How long a paused run waits before it looks again.
-const PAUSE_TURN_MS: i32 = 40;
-/// While the visitor moves the view, it gets frames for this share of a long step's time, and at most for so long.
-const HAND_SHARE: f64 = 0.1;
-const HAND_MS: f64 = 300.0;
-const FRAME_MS: i32 = 16;
 
 /// Where a scan comes from.
 pub enum Origin {
@@ -42,7 +36,10 @@ pub async fn open(engine: Rc<Engine>, origin: Origin) {
     // A turn for the page to show the stage: reading a large scan takes its time.
     platform::sleep_ms(0).await;
     match open_source(origin).and_then(scan::open) {
-        Ok(scan) => opened(&engine, scan),
+        Ok(scan) => {
+            rates::measure(engine.clone()).await;
+            opened(&engine, scan);
+        }
         Err(error) => fail_scan(&engine, &error),
     }
 }
@@ -121,8 +118,15 @@ fn opened(engine: &Rc<Engine>, scan: Scan) {
             finding: convert::finding(finding),
         });
     }
+    // Where there is no depth, the network makes more of the pictures than stereo alone.
+    let network = scan.has_color() && !scan.has_depth();
+    let network = network.then(|| DepthSource::Network(Preset::Small.config()));
     engine.set_scan(scan);
-    plan(engine, Options::default());
+    let options = Options {
+        depth: network,
+        ..Options::default()
+    };
+    plan(engine, options);
 }
 
 /// Plans and tells; whether there is a plan.
@@ -133,7 +137,11 @@ pub fn plan(engine: &Rc<Engine>, options: Options) -> bool {
     match recon::plan(&scan, &engine.limits, options) {
         Ok(plan) => {
             engine.emit(&Event::Planned {
-                plan: convert::plan_summary(&plan),
+                plan: convert::plan_summary(
+                    &plan,
+                    engine.network_is_apart(),
+                    engine.rates.get().rates(),
+                ),
             });
             let frames = plan.keyframes.iter().map(|&frame| &scan.frames()[frame]);
             let poses = frames.map(|frame| CameraPose {
@@ -169,14 +177,23 @@ pub async fn run(engine: Rc<Engine>, options: RunOptions) {
         return;
     };
     engine.begin(plan.volume.voxel_size_m * volume::BRICK_EDGE as f32);
-    let mut sink = PageSink {
-        engine: engine.clone(),
-        started_ms: platform::now_ms(),
-        total: 0,
-        step_ms: platform::now_ms(),
+    let mut sink = PageSink::new(engine.clone());
+    let result = match plan.depth {
+        DepthSource::Network(config) => match engine.weights.network(&engine, &config).await {
+            Ok(network) => {
+                recon::reconstruct(&scan, &plan, &*network, &engine.device, &mut sink).await
+            }
+            Err(fault) => {
+                engine.set_state(RunState::Idle);
+                return without_network(&engine, fault, &sink);
+            }
+        },
+        DepthSource::Sensor | DepthSource::Stereo(_) => {
+            recon::run(&scan, &plan, &engine.device, &mut sink).await
+        }
     };
-    let result = recon::run(&scan, &plan, &engine.device, &mut sink).await;
     engine.set_state(RunState::Idle);
+    engine.given.clear();
     match result {
         Ok(outcome) => {
             let (_, triangles) = engine.counts();
@@ -211,81 +228,18 @@ pub async fn run(engine: Rc<Engine>, options: RunOptions) {
     }
 }
 
-/// Tells the page about a run, and lets it hold or stop it.
-struct PageSink {
-    engine: Rc<Engine>,
-    started_ms: f64,
-    total: usize,
-    /// When the step that is being done began.
-    step_ms: f64,
-}
-
-impl PageSink {
-    fn elapsed_s(&self) -> f64 {
-        (platform::now_ms() - self.started_ms) / 1000.0
-    }
-}
-
-impl Sink for PageSink {
-    fn stage(&mut self, stage: Stage, total: usize) {
-        self.total = total;
-        self.engine.emit(&Event::Stage {
-            stage: convert::stage_name(stage),
-        });
-    }
-
-    fn progress(&mut self, done: usize) {
-        let (_, triangles) = self.engine.counts();
-        self.engine.emit(&Event::Progress {
-            done: done as u32,
-            total: self.total as u32,
-            triangles,
-            elapsed_s: self.elapsed_s(),
+/// The run ends before it began.
+fn without_network(engine: &Engine, fault: Fault, sink: &PageSink) {
+    match fault {
+        Fault::Stopped => engine.emit(&Event::Finished {
+            cancelled: true,
+            frames: 0,
+            bricks: 0,
+            triangles: 0,
+            elapsed_s: sink.elapsed_s(),
             heap_bytes: platform::heap_bytes(),
-        });
-    }
-
-    fn finding(&mut self, finding: Finding) {
-        self.engine.emit(&Event::Finding {
-            finding: convert::finding(&finding),
-        });
-    }
-
-    fn eye(&self) -> Option<Vec3> {
-        self.engine.eye()
-    }
-
-    async fn bricks(&mut self, meshes: BrickMeshes) -> Result<(), VolumeError> {
-        self.engine.show(meshes).await?;
-        let (bricks, triangles) = self.engine.counts();
-        self.engine.emit(&Event::Bricks { bricks, triangles });
-        Ok(())
-    }
-
-    async fn checkpoint(&mut self) -> Flow {
-        let now_ms = platform::now_ms();
-        let hand_ms = ((now_ms - self.step_ms) * HAND_SHARE).min(HAND_MS);
-        platform::sleep_ms(0).await;
-        while self.engine.is_touched() && platform::now_ms() - now_ms < hand_ms {
-            platform::sleep_ms(FRAME_MS).await;
-        }
-        if self.engine.state() == RunState::Pausing {
-            let held_ms = platform::now_ms();
-            self.engine.set_state(RunState::Paused);
-            self.engine.emit(&Event::Paused);
-            while self.engine.state() == RunState::Paused {
-                platform::sleep_ms(PAUSE_TURN_MS).await;
-            }
-            self.started_ms += platform::now_ms() - held_ms;
-            if self.engine.state() == RunState::Running {
-                self.engine.emit(&Event::Resumed);
-            }
-        }
-        self.step_ms = platform::now_ms();
-        match self.engine.state() {
-            RunState::Stopping => Flow::Stop,
-            _ => Flow::Continue,
-        }
+        }),
+        failed @ Fault::Failed { .. } => failed.tell(engine),
     }
 }
 

@@ -28,6 +28,9 @@ pub enum Request {
         pixel_ratio: f32,
         /// Where to compute.
         device: DeviceChoice,
+        /// Where the network's weights lie, if not beside the worker script.
+        #[serde(default)]
+        weights: Option<WeightsAddress>,
     },
     /// Open a dropped folder: the files are passed beside it, one for each path, in the same order.
     OpenFolder {
@@ -41,6 +44,14 @@ pub enum Request {
     OpenSample {
         /// Which room.
         seed: u32,
+    },
+    /// Take these weights for the network, here passed beside it as the only file, instead of those that would be fetched.
+    UseWeights,
+    /// Give the next run what an earlier run with the same scan, options and weights made in a stage: the bytes of its `Kept` event
+    /// are passed beside it as the only file.
+    Keep {
+        /// Which stage.
+        stage: StageName,
     },
     /// Run the plan that the last `Planned` event announced, with these options (a change of options plans again first).
     Run {
@@ -93,10 +104,23 @@ pub enum Request {
 #[derive(Deserialize, Tsify, Clone, Copy, PartialEq, Eq)]
 #[serde(rename_all = "camelCase")]
 pub enum DeviceChoice {
-    /// WebGPU if it is there, otherwise the CPU.
+    /// WebGPU if it is there, otherwise the CPU. An adapter that is software leaves the network to the CPU.
     Auto,
+    /// WebGPU for everything, even where the adapter is software: to try on one machine what happens on another.
+    Gpu,
     /// The CPU, even where there is WebGPU.
     Cpu,
+}
+
+/// Where weights are fetched from.
+#[derive(Deserialize, Tsify, Clone)]
+#[serde(rename_all = "camelCase")]
+pub struct WeightsAddress {
+    /// Absolute address of a safetensors file.
+    pub url: String,
+    /// What its bytes must hash to, in hexadecimal; left out, they are taken as they come.
+    #[serde(default)]
+    pub sha256: Option<String>,
 }
 
 /// What to do with a scan.
@@ -117,6 +141,8 @@ pub struct RunOptions {
     pub depth: Option<DepthSource>,
     /// With stereo, pictures are scaled down to fit into this; 320 by 240 by default.
     pub stereo_size: PixelSize,
+    /// With the network: how much of it; `small` by default, which a phone can do.
+    pub preset: PresetName,
 }
 
 /// Where depth comes from.
@@ -127,9 +153,21 @@ pub enum DepthSource {
     Sensor,
     /// The colour pictures and their poses: what one sees is looked for in its neighbours.
     Stereo,
-    /// The colour pictures and their poses, by a trained network. It needs weights, which the engine cannot be given yet:
-    /// a run with it fails and says so.
+    /// The colour pictures and their poses, by a trained network, whose weights are fetched once and kept.
     Network,
+}
+
+/// How much work the network is given.
+#[derive(Serialize, Deserialize, Tsify, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[serde(rename_all = "camelCase")]
+pub enum PresetName {
+    /// Pictures of 160 by 120 pixels, 20 views a tile: what the released weights were trained on.
+    #[default]
+    Small,
+    /// Pictures of 320 by 240 pixels, 60 views a tile.
+    Medium,
+    /// Pictures of 640 by 480 pixels, 100 views a tile: the paper's.
+    Full,
 }
 
 /// Width and height.
@@ -186,6 +224,13 @@ pub enum Event {
         /// How up was found, in words.
         gravity: String,
     },
+    /// Weights that were given are in use.
+    Weights {
+        /// Name of their file.
+        name: String,
+        /// Its size.
+        bytes: f64,
+    },
     /// What will be done, before any work.
     Planned {
         /// The plan.
@@ -193,7 +238,7 @@ pub enum Event {
     },
     /// A stage began.
     Stage {
-        /// `opening`, `warmingUp`, then `fusing` (the sensor's depth) or `matching` (stereo), `meshing`.
+        /// Which; their order for each source of depth is [`StageName`]'s.
         stage: StageName,
     },
     /// A count of known work within the stage.
@@ -208,6 +253,11 @@ pub enum Event {
         elapsed_s: f64,
         /// Size of the engine's memory in bytes.
         heap_bytes: f64,
+    },
+    /// A stage is done; what it made is passed beside it, for another engine to go on from should this one be lost.
+    Kept {
+        /// Which stage.
+        stage: StageName,
     },
     /// Bricks of the mesh changed on show.
     Bricks {
@@ -283,16 +333,23 @@ pub struct PlanSummary {
     pub device_bytes: f64,
     /// Bytes of heap expected.
     pub heap_bytes: f64,
+    /// Seconds expected, within a factor of two: the work counted, over how fast this machine did a little of it.
+    pub expected_s: Option<f64>,
+    /// Bytes of weights that the run will fetch first, which the worker script knows: 0 where they are at hand, nothing without the
+    /// network or where their size is not known.
+    pub download_bytes: Option<f64>,
     /// What was turned down and why, in words; empty when everything fits.
     pub remarks: Vec<String>,
 }
 
 /// A stage of the run.
-#[derive(Serialize, Tsify, Clone, Copy, PartialEq, Eq)]
+#[derive(Serialize, Deserialize, Tsify, Clone, Copy, PartialEq, Eq)]
 #[serde(rename_all = "camelCase")]
 pub enum StageName {
     /// The scan is read.
     Opening,
+    /// The network's weights are fetched; counted in bytes.
+    Downloading,
     /// Kernels are compiled.
     WarmingUp,
     /// Views are matched with their neighbours, and the depth that comes of it becomes a volume; counted in keyframes.

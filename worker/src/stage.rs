@@ -112,7 +112,7 @@ impl Stage {
         }
     }
 
-    /// Takes everything away, before a run whose bricks have another size.
+    /// Takes all bricks away, before those of another size.
     pub fn clear(&mut self, brick_size_m: f32) {
         match &mut self.paper {
             Paper::Gpu { gpu, arena, .. } => {
@@ -120,7 +120,6 @@ impl Stage {
             }
             Paper::Cpu { painter, .. } => *painter = CpuPainter::new(brick_size_m),
         }
-        self.controls.home();
     }
 
     /// Whether bricks must be read from the device before [`Stage::show`] can take them.

@@ -4,13 +4,15 @@
  */
 import init, { Engine } from "./engine.js";
 import type { Event, Request } from "./engine.js";
+import { download, missing, type Progress } from "./download.js";
+import { released } from "./released.js";
 
 /** From the page to the worker: a request, and the binary things that travel beside it. */
 export interface ToWorker {
   request: Request;
   /** Beside `start`; without it the engine computes and shows nothing. */
   canvas?: OffscreenCanvas;
-  /** Beside `openFolder` (one for each path, in the same order) and `openZip`. */
+  /** Beside `openFolder` (one for each path, in the same order), `openZip` and `useWeights`. */
   files?: File[];
 }
 
@@ -29,6 +31,8 @@ const READS_AT_ONCE = 256;
 let opened = 0;
 let started = false;
 let dead = false;
+/** Bytes of weights that the network still has to wait for, as far as known. */
+let toFetch: number | undefined;
 
 scope.onmessage = ({ data }: MessageEvent<ToWorker>) => {
   if (data.request.type === "start" && !started) {
@@ -56,7 +60,16 @@ async function start({ request, canvas }: ToWorker): Promise<void> {
     return;
   }
   try {
-    const up = await Engine.start(canvas, request, emit);
+    const weights = (request.type === "start" && request.weights) || { ...released, url: new URL(released.url, import.meta.url).href };
+    const looked = missing(weights).then((bytes) => void (toFetch = bytes), () => undefined);
+    const bring = async (progress: Progress): Promise<Blob> => {
+      const file = await download(weights, progress, warn);
+      toFetch = 0;
+      return file;
+    };
+    const up = await Engine.start(canvas, request, emit, bring);
+    // The first plan says what has to be fetched.
+    await looked;
     engine = up;
     for (const message of waiting.splice(0)) void receive(up, message);
   } catch (cause) {
@@ -101,9 +114,16 @@ function emit(event: Event, payload?: Uint8Array): void {
   if (dead) return;
   // What the engine says about its own end is better than what could be said here about the trap that follows it.
   dead = event.type === "failed" && (event.code === "internal" || !engine);
+  if (event.type === "weights") toFetch = 0;
+  if (event.type === "planned" && event.plan.depth === "network") event.plan.downloadBytes = toFetch;
   const bytes = payload as Uint8Array<ArrayBuffer> | undefined;
   const message: FromWorker = { event, payload: bytes };
   scope.postMessage(message, bytes ? [bytes.buffer] : []);
+}
+
+/** What went wrong with the weights without stopping anything. */
+function warn(expected: string, found: string, advice: string): void {
+  emit({ type: "finding", finding: { severity: "warning", code: "weights", file: undefined, line: undefined, expected, found, advice } });
 }
 
 function die(

@@ -13,6 +13,13 @@ export function seconds(s: number): string {
   return s < 60 ? `${Math.round(s)} s` : `${Math.floor(s / 60)} min ${Math.round(s % 60)} s`;
 }
 
+/** A time span that is foretold, no more exactly than it is known. */
+export function about(s: number): string {
+  const steps = s < 10 ? 1 : s < 60 ? 5 : s < 600 ? 30 : 300;
+  const rounded = Math.max(1, Math.round(s / steps)) * steps;
+  return `about ${rounded < 60 ? `${rounded} s` : `${Number((rounded / 60).toFixed(1))} min`}`;
+}
+
 /** A length given in metres, in centimetres. */
 export function centimetres(m: number): string {
   return `${Number((m * 100).toFixed(1))} cm`;

@@ -58,7 +58,7 @@ function keepFocus(moved: boolean, atStart: boolean): void {
   if (moved ? lost : active?.closest("[hidden]")) byId(atStart ? "start-title" : "panel-title").focus();
 }
 
-for (const type of ["ready", "opened", "planned", "stage", "progress", "bricks", "finding", "finished", "failed", "exported"] as const) {
+for (const type of ["ready", "opened", "weights", "planned", "stage", "progress", "bricks", "finding", "finished", "failed", "exported"] as const) {
   viewer.addEventListener(`ipd-${type}`, (event) => change(take(model, (event as CustomEvent<EngineEvent>).detail)));
 }
 viewer.addEventListener("ipd-state", ({ detail }) => change(enter(model, detail)));
@@ -76,10 +76,10 @@ help.addEventListener("click", (event) => {
 });
 
 wireStart(viewer);
-wireTools(viewer);
+wireTools(viewer, () => drawTools(model));
 wirePanel(viewer);
 
-if (query.get("device") === "cpu") viewer.setAttribute("device", "cpu");
+viewer.setAttribute("device", query.get("device") ?? "auto");
 viewer.append(Object.assign(document.createElement("span"), { slot: "empty" }));
 byId("stage").prepend(viewer);
 if (query.has("sample")) viewer.openSample(Number(query.get("sample")) || undefined, { autostart: query.get("autostart") !== "0" }).catch(() => undefined);

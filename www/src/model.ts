@@ -10,6 +10,8 @@ export interface Model {
   ready?: EventOf<"ready">;
   opened?: EventOf<"opened">;
   plan?: PlanSummary;
+  /** Weights that the visitor gave. */
+  weights?: EventOf<"weights">;
   findings: FindingMessage[];
   /** How many of the findings are about the scan itself: those of a run go when it is run again. */
   ofScan: number;
@@ -28,7 +30,7 @@ export function blank(): Model {
 
 /** Takes a new state in. A scan that is being opened begins with nothing; a new engine has not said what it is yet. */
 export function enter(model: Model, state: State): Model {
-  if (state === "opening") return { ...blank(), ready: model.ready, state };
+  if (state === "opening") return { ...blank(), ready: model.ready, weights: model.weights, state };
   if (state === "starting") return { ...blank(), state };
   if (state === "planned") return { ...model, state, ofScan: model.findings.length };
   if (state === "running" && model.state !== "paused") {
@@ -44,6 +46,8 @@ export function take(model: Model, event: EngineEvent): Model {
       return { ...model, ready: event };
     case "opened":
       return { ...model, opened: event };
+    case "weights":
+      return { ...model, weights: event };
     case "planned":
       return { ...model, plan: event.plan };
     case "stage":

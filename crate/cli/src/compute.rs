@@ -38,6 +38,7 @@ impl DeviceChoice {
                 Device::flex(),
                 Limits {
                     binding_bytes: CPU_BINDING_BYTES,
+                    network_is_bound: false,
                 },
             )),
             Self::Gpu => {
@@ -46,6 +47,7 @@ impl DeviceChoice {
                 let bytes = setup.device.limits().max_storage_buffer_binding_size;
                 let limits = Limits {
                     binding_bytes: usize::try_from(bytes).unwrap_or(usize::MAX),
+                    network_is_bound: true,
                 };
                 Ok((device, limits))
             }

@@ -24,6 +24,9 @@ pub enum Failure {
     /// No GPU, though one was asked for.
     #[error("expected a GPU that burn can use, found none ({0}); run with --device cpu")]
     Gpu(String),
+    /// A benchmark without a result.
+    #[error(transparent)]
+    Unread(#[from] ::bench::Unread),
     /// The scan cannot be opened.
     #[error(transparent)]
     Scan(#[from] scan::ScanError),

@@ -161,7 +161,7 @@ fn print_plan(plan: &Plan) {
         plan.frames,
         plan.options.voxel_size_m * 100.0,
         plan.bricks,
-        plan.device_bytes >> 20,
+        (plan.device_bytes + plan.network_bytes) >> 20,
     );
     for remark in &plan.remarks {
         eprintln!("note: {remark}");

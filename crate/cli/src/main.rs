@@ -1,5 +1,6 @@
 //! `ipdrecon`: the engine on the command line. The same `recon` as in the browser, with files at both ends.
 
+mod bench;
 mod compute;
 mod depth_folder;
 mod doctor;
@@ -43,6 +44,8 @@ enum Command {
     Eval(eval::Arguments),
     /// The paper's tables on any scans.
     Table(table::Arguments),
+    /// Time the network's parts on this machine.
+    Bench(bench::Arguments),
     /// Look into a scan and say what is wrong with it.
     Doctor(doctor::Arguments),
     /// Make scans of made-up rooms, with exact depth, to learn from.
@@ -60,6 +63,7 @@ fn main() -> ExitCode {
         Command::Reconstruct(arguments) => reconstruct::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
         Command::Table(arguments) => table::run(&arguments),
+        Command::Bench(arguments) => bench::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Synth(arguments) => synth::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),

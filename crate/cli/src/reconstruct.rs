@@ -66,10 +66,10 @@ enum Choice {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let file = Weights::read(arguments.weights.as_deref())?;
     // Before the scan is opened: that may take long.
-    let preset = arguments.preset(&file.get(weights::config)?);
+    file.get(weights::config)?;
     let opened = arguments.job.open()?;
     let network = file.get(|bytes| weights::load(bytes, &opened.device))?;
-    arguments.reconstruct(&opened, &network, preset)
+    arguments.reconstruct(&opened, &network)
 }
 
 impl Arguments {
@@ -82,18 +82,14 @@ impl Arguments {
         }
     }
 
-    fn reconstruct(
-        &self,
-        opened: &Opened,
-        network: &Ipdrecon,
-        preset: Preset,
-    ) -> Result<(), Failure> {
-        let usual = preset.config();
+    fn reconstruct(&self, opened: &Opened, network: &Ipdrecon) -> Result<(), Failure> {
+        let usual = self.preset(network.config()).config();
         let config = NetworkConfig {
             size: self.size.map_or(usual.size, |size| size.0),
             views_a_tile: self.views.unwrap_or(usual.views_a_tile),
             reach_m: self.reach,
             seed: self.seed,
+            net: *network.config(),
             choice: match self.choice {
                 Choice::Coverage => ViewChoice::Coverage,
                 Choice::Random => ViewChoice::Random,

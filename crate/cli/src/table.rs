@@ -95,7 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             views => views,
         };
         let name = arguments.device.name(&device);
-        efficiency::table(&networks, views, arguments.size, &device, &name)
+        efficiency::table(&networks, views, arguments.size, &device, &name)?
     } else {
         let sets = scans::sets(&arguments.scans)?;
         let setting = Setting {

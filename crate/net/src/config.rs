@@ -29,7 +29,7 @@ impl Level {
 }
 
 /// Widths and switches. Arrays go from coarse to fine.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NetConfig {
     /// Channels of the backbone: the stem before and after its projection, then at strides 4, 8 and 16.
@@ -117,6 +117,13 @@ impl NetConfig {
             unet: [16, 12, 8],
             ..Self::full()
         }
+    }
+
+    /// Bytes of a voxel in the widest tensor of a level's 3D network: what it is given, or its last layers' halves side by
+    /// side (method 1.7).
+    pub fn row_bytes(&self, level: Level) -> usize {
+        let channels = crate::model::inputs(self, level).max(6 * self.unet[level as usize]);
+        channels * size_of::<f32>()
     }
 
     /// The same widths with none of the paper's parts: VoRTX.

@@ -8,6 +8,7 @@ pub use maps::UNetMaps;
 pub use sites::{children, halved};
 pub use unet::UNet;
 
+use crate::ops::linear::of_rows;
 use burn::{
     Tensor,
     module::Module,
@@ -52,7 +53,7 @@ impl Decoder {
             let device = features.device();
             return (features, Tensor::zeros([0], &device));
         }
-        let logit = self.head.forward(features.clone()).squeeze_dim(1);
+        let logit = of_rows(&self.head, features.clone()).squeeze_dim(1);
         (features, logit)
     }
 }

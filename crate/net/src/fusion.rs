@@ -4,6 +4,8 @@ use burn::module::Module;
 use burn::nn::{LayerNorm, LayerNormConfig, Linear, LinearConfig};
 use burn::tensor::{Device, Tensor};
 
+use crate::ops::cube;
+use crate::ops::linear::{normed_rows, of_rows};
 use crate::ops::pool::pool;
 use crate::ops::rows::sample;
 use crate::ops::views::{self, ViewsShape, view_tokens};
@@ -26,7 +28,7 @@ pub use pairs::{PairTensors, Pairs};
 const DEPTH_MEAN_M: f32 = 1.85;
 const DEPTH_STEP_M: f32 = 0.85;
 /// Layers of the encoder.
-const LAYERS: usize = 2;
+pub const LAYERS: usize = 2;
 
 /// What the fusion of a level is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,13 +105,15 @@ impl Fusion {
         let depth = ((pairs.z_m.clone() - DEPTH_MEAN_M) / DEPTH_STEP_M).unsqueeze_dim(1);
         let tokens = if views::runs_on(&plane.base) {
             self.tokens_in_blocks(plane, pairs, depth)
+        } else if cube::NO_OTHER || cube::runs_on(&plane.base.device()) {
+            self.tokens_by_kernels(plane, pairs, depth)
         } else {
             self.tokens(plane, pairs, depth)
         };
-        let occupancy = self.occupancy.forward(tokens.clone()).flatten::<1>(0, 1);
+        let occupancy = of_rows(&self.occupancy, tokens.clone()).flatten::<1>(0, 1);
         let pooled = pool(tokens, occupancy.clone(), segments, pooling);
         Fused {
-            features: self.norm.forward(pooled),
+            features: normed_rows(&self.norm, pooled),
             occupancy,
         }
     }
@@ -134,6 +138,47 @@ impl Fusion {
         tokens
     }
 
+    /// The same in kernels for WebGPU.
+    fn tokens_by_kernels(&self, plane: &Plane, pairs: &PairTensors, depth: Tensor<2>) -> Tensor<2> {
+        let base = sample(plane.base.clone(), &pairs.places);
+        let extra = match self.matching {
+            true => Tensor::cat(vec![depth, likeness(base.clone(), &pairs.segments)], 1),
+            false => depth,
+        };
+        let lifted = self.lift.as_ref().zip(plane.hidden.as_ref());
+        let hidden = lifted.map(|(_, hidden)| sample(hidden.clone(), &pairs.places));
+        let shape = self.shape(plane, &extra);
+        views::fused::tokens(
+            base,
+            hidden,
+            extra,
+            self.weights(plane),
+            &pairs.segments,
+            shape,
+        )
+    }
+
+    /// All weights that make tokens, in the order of [`view_tokens`].
+    fn weights(&self, plane: &Plane) -> Vec<Tensor<1>> {
+        let lifted = self.lift.as_ref().filter(|_| plane.hidden.is_some());
+        let first = lifted.map(|lift| flat(&lift.linear)).into_iter();
+        let first = first.chain([flat(&self.embed)]).flatten().flatten();
+        first
+            .chain(self.layers.iter().flat_map(EncoderLayer::weights))
+            .collect()
+    }
+
+    /// Widths, with `extra` numbers a pair `[P, E]`.
+    fn shape(&self, plane: &Plane, extra: &Tensor<2>) -> ViewsShape {
+        ViewsShape {
+            channels: plane.base.dims()[1],
+            extra: extra.dims()[1],
+            lift: self.lift.is_some() && plane.hidden.is_some(),
+            layers: self.layers.len(),
+            heads: HEADS,
+        }
+    }
+
     /// The same in loops for the processor.
     fn tokens_in_blocks(&self, plane: &Plane, pairs: &PairTensors, depth: Tensor<2>) -> Tensor<2> {
         let extra = if self.matching {
@@ -143,24 +188,12 @@ impl Fusion {
             depth
         };
         let lifted = self.lift.as_ref().zip(plane.hidden.as_ref());
-        let mut weights = Vec::new();
-        if let Some((lift, _)) = lifted {
-            weights.extend(flat(&lift.linear).into_iter().flatten());
-        }
-        weights.extend(flat(&self.embed).into_iter().flatten());
-        weights.extend(self.layers.iter().flat_map(EncoderLayer::weights));
-        let shape = ViewsShape {
-            channels: plane.base.dims()[1],
-            extra: extra.dims()[1],
-            lift: lifted.is_some(),
-            layers: self.layers.len(),
-            heads: HEADS,
-        };
+        let shape = self.shape(plane, &extra);
         view_tokens(
             plane.base.clone(),
             lifted.map(|(_, hidden)| hidden.clone()),
             extra,
-            Tensor::cat(weights, 0),
+            Tensor::cat(self.weights(plane), 0),
             (&pairs.places, &pairs.segments),
             shape,
         )

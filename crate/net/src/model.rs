@@ -53,7 +53,7 @@ impl Ipdrecon {
             planes: PlaneNet::init(config, device),
             fusion,
             decoders,
-            config: config.clone(),
+            config: *config,
         }
     }
 
@@ -65,6 +65,12 @@ impl Ipdrecon {
     /// Planes of each level from pictures `[V, 3, H, W]` (sRGB, 0 to 255, H and W multiples of 16) and their cameras.
     pub fn planes(&self, images: Tensor<4>, views: &[View]) -> [Plane; 3] {
         self.planes.forward(images, views)
+    }
+
+    /// The first part of [`Ipdrecon::planes`], which knows no camera: backbone and pyramid, coarse to fine. For comparisons with other
+    /// programs that run the same layers.
+    pub fn pyramid(&self, images: Tensor<4>) -> [Tensor<4>; 3] {
+        self.planes.features(images)
     }
 
     /// Fused features `[N, C]` of a level's voxels, and each pair's projective occupancy.
@@ -112,7 +118,7 @@ impl Ipdrecon {
 }
 
 /// Channels that a level's 3D network is given (method 1.7).
-fn inputs(config: &NetConfig, level: Level) -> usize {
+pub(crate) fn inputs(config: &NetConfig, level: Level) -> usize {
     let fused = config.planes[level as usize];
     let above = match level {
         Level::Coarse => 0,

@@ -59,15 +59,12 @@ impl<F: FnMut(&str, &[usize]) -> Option<Vec<f32>>> ModuleMapper for Writer<F> {
         let shape: Vec<usize> = param.lazy_shape().to_vec();
         match (self.values)(&self.path.join("."), &shape) {
             None => param,
-            Some(values) => param.map(|old| {
+            // The old numbers, which may not have been drawn yet, are not asked for.
+            Some(values) => {
                 let data = TensorData::new(values, shape);
-                let fresh = Tensor::from_data(data, &old.device());
-                if old.is_require_grad() {
-                    fresh.require_grad()
-                } else {
-                    fresh
-                }
-            }),
+                let (fresh, id) = (Tensor::from_data(data, &param.lazy_device()), param.id);
+                param.transform_for_load(fresh, id)
+            }
         }
     }
 }

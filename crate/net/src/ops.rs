@@ -4,13 +4,20 @@ pub mod affine;
 pub mod attention;
 pub mod batch_norm;
 pub mod channel_norm;
+pub(crate) mod cube;
 pub mod depthwise;
 pub(crate) mod flex;
+pub mod folded;
 pub(crate) mod functions;
 mod lanes;
+pub(crate) mod linear;
+mod lines;
 pub mod linrec;
+mod padded;
+pub(crate) mod planar;
 pub mod pointwise;
 pub mod pool;
+pub(crate) mod register;
 pub mod rows;
 pub mod scan;
 pub mod segments;
@@ -28,6 +35,9 @@ use burn::backend::{
     tensor::FloatTensor,
 };
 use burn::tensor::Device;
+
+#[cfg(not(target_family = "wasm"))]
+pub use cube::use_plain;
 
 /// Whether `device` computes in flex's loops, with or without differentiation.
 pub(crate) fn on_processor(device: &Device) -> bool {

@@ -17,6 +17,7 @@ use burn::module::{Module, Param};
 use burn::nn::conv::Conv2d;
 use burn::tensor::{Device, Tensor};
 
+use crate::ops::batch_norm::scaled;
 use crate::{Level, NetConfig, View};
 use affine::AffineCompensation;
 use backbone::Backbone;
@@ -114,8 +115,7 @@ impl PlaneNet {
     /// Planes of `images` `[V, 3, H, W]`, sRGB from 0 to 255, seen by `views`, as many; [`check_size`] says which sizes
     /// there are. Planes are `ceil(H / stride)` by `ceil(W / stride)`.
     pub fn forward(&self, images: Tensor<4>, views: &[View]) -> [Plane; 3] {
-        let strided = self.backbone.forward(normalised(images));
-        let [coarse, medium, fine] = self.pyramid.forward(strided);
+        let [coarse, medium, fine] = self.features(images);
         let [c, m, f] = &self.levels;
         [
             c.forward(coarse, views, Level::Coarse),
@@ -123,14 +123,21 @@ impl PlaneNet {
             f.forward(fine, views, Level::Fine),
         ]
     }
+
+    /// What the pyramid makes of `images`, coarse to fine: `[V, C, h, w]` each.
+    pub fn features(&self, images: Tensor<4>) -> [Tensor<4>; 3] {
+        self.pyramid
+            .forward(self.backbone.forward(normalised(images)))
+    }
 }
 
 /// Pictures with ScanNet's mean at 0 and its standard deviation at 1.
 fn normalised(images: Tensor<4>) -> Tensor<4> {
     let device = images.device();
-    let of_channels =
-        |values: [f32; 3]| Tensor::<1>::from_floats(values, &device).reshape([1, 3, 1, 1]);
-    (images - of_channels(MEAN)) * of_channels(DEVIATION.map(|d| 1.0 / d))
+    let of_channels = |values: [f32; 3]| Tensor::<1>::from_floats(values, &device);
+    let scale = of_channels(DEVIATION.map(|d| 1.0 / d));
+    let shift = of_channels([0, 1, 2].map(|c| -MEAN[c] / DEVIATION[c]));
+    scaled(images, scale, shift, false)
 }
 
 impl LevelPlanes {

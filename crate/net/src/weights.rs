@@ -3,10 +3,11 @@
 pub mod vortx;
 
 use std::collections::{HashMap, HashSet};
+use std::{io, ops::Range};
 
 use burn::tensor::Device;
 use half::f16;
-use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView, serialize};
+use safetensors::tensor::{Dtype, Metadata, SafeTensorError, TensorInfo, TensorView, serialize};
 
 use crate::config::ConfigError;
 use crate::{Ipdrecon, NetConfig, named};
@@ -15,6 +16,8 @@ use crate::{Ipdrecon, NetConfig, named};
 const VERSION: &str = "1";
 const KEY_VERSION: &str = "ipdrecon.version";
 const KEY_CONFIG: &str = "ipdrecon.config";
+/// The length of a safetensors file's header, which comes first.
+const LENGTH_BYTES: usize = 8;
 
 /// How numbers are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,6 +26,35 @@ pub enum Precision {
     F16,
     /// 32-bit floats: for going on with training.
     F32,
+}
+
+/// A file that is read in parts, so that memory never holds more of it than its largest tensor.
+pub trait WeightsFile {
+    /// Its size in bytes.
+    fn len(&self) -> usize;
+
+    /// Whether there is nothing in it.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// These bytes of it, all below [`WeightsFile::len`].
+    ///
+    /// # Errors
+    /// A file that cannot be read any more.
+    fn read(&self, range: Range<usize>) -> io::Result<Vec<u8>>;
+}
+
+impl<B: AsRef<[u8]> + ?Sized> WeightsFile for B {
+    fn len(&self) -> usize {
+        self.as_ref().len()
+    }
+
+    fn read(&self, range: Range<usize>) -> io::Result<Vec<u8>> {
+        let part = self.as_ref().get(range);
+        part.map(<[u8]>::to_vec)
+            .ok_or_else(|| io::ErrorKind::UnexpectedEof.into())
+    }
 }
 
 /// Why a file is not the weights of this network.
@@ -39,6 +71,9 @@ pub enum WeightsError {
         /// What the reader stumbled over.
         why: SafeTensorError,
     },
+    /// The file could not be read.
+    #[error("expected to read the weights, found: {0}; give the file again")]
+    Unreadable(#[from] io::Error),
     /// A safetensors file of another program.
     #[error(
         "expected `{KEY_CONFIG}` in the header of the weights, found none; \
@@ -158,46 +193,32 @@ pub fn save(model: &Ipdrecon, precision: Precision) -> Result<Vec<u8>, WeightsEr
 ///
 /// # Errors
 /// No weights of this network's version.
-pub fn config(bytes: &[u8]) -> Result<NetConfig, WeightsError> {
-    let (_, header) = SafeTensors::read_metadata(bytes).map_err(|why| WeightsError::Format {
-        found_bytes: bytes.len(),
-        why,
-    })?;
-    let entries = header.metadata().as_ref();
-    let entry = |key: &str| entries.and_then(|entries| entries.get(key));
-    let config = entry(KEY_CONFIG).ok_or(WeightsError::NotOurs)?;
-    match entry(KEY_VERSION) {
-        Some(version) if version == VERSION => {
-            let config: NetConfig = serde_json::from_str(config)?;
-            config.check()?;
-            Ok(config)
-        }
-        other => Err(WeightsError::Version {
-            found: other.map_or("none", String::as_str).to_owned(),
-        }),
-    }
+pub fn config(file: &(impl WeightsFile + ?Sized)) -> Result<NetConfig, WeightsError> {
+    Header::read(file)?.config()
 }
 
-/// The network in a file, on `device`.
+/// The network in a file, on `device`, read tensor by tensor.
 ///
 /// # Errors
 /// A file that is cut short, of another program or version, or that does not fit its own configuration.
-pub fn load(bytes: &[u8], device: &Device) -> Result<Ipdrecon, WeightsError> {
-    let config = config(bytes)?;
-    let file = SafeTensors::deserialize(bytes).map_err(|why| WeightsError::Format {
-        found_bytes: bytes.len(),
-        why,
-    })?;
-    let mut unused: HashSet<&str> = file.names().into_iter().collect();
+pub fn load(file: &(impl WeightsFile + ?Sized), device: &Device) -> Result<Ipdrecon, WeightsError> {
+    let header = Header::read(file)?;
+    let config = header.config()?;
+    let mut unused: HashSet<String> = header.metadata.offset_keys().into_iter().collect();
     let mut missing = Vec::new();
     let mut fault = None;
     let model = named::replace(Ipdrecon::new(&config, device), |name, shape| {
-        let Ok(view) = file.tensor(name) else {
+        let Some(info) = header.metadata.info(name) else {
             missing.push(name.to_owned());
             return None;
         };
         unused.remove(name);
-        match numbers(name, shape, &view) {
+        let (start, end) = info.data_offsets;
+        let bytes = file.read(header.end + start..header.end + end);
+        match bytes
+            .map_err(WeightsError::Unreadable)
+            .and_then(|bytes| numbers(name, shape, info, &bytes))
+        {
             Ok(values) => Some(values),
             Err(error) => {
                 fault.get_or_insert(error);
@@ -208,37 +229,85 @@ pub fn load(bytes: &[u8], device: &Device) -> Result<Ipdrecon, WeightsError> {
     if let Some(error) = fault {
         return Err(error);
     }
-    let mut unknown: Vec<&str> = unused.into_iter().collect();
+    let mut unknown: Vec<String> = unused.into_iter().collect();
     unknown.sort_unstable();
-    let first = missing
-        .first()
-        .map(String::as_str)
-        .or(unknown.first().copied());
-    match first {
+    match missing.first().or(unknown.first()) {
         None => Ok(model),
         Some(first) => Err(WeightsError::Names {
             missing: missing.len(),
             unknown: unknown.len(),
-            first: first.to_owned(),
+            first: first.clone(),
         }),
     }
 }
 
-fn numbers(name: &str, shape: &[usize], view: &TensorView<'_>) -> Result<Vec<f32>, WeightsError> {
-    if view.shape() != shape {
+/// What stands before the numbers of a file.
+struct Header {
+    metadata: Metadata,
+    /// Where the numbers begin.
+    end: usize,
+}
+
+impl Header {
+    fn read(file: &(impl WeightsFile + ?Sized)) -> Result<Self, WeightsError> {
+        let fault = |why| WeightsError::Format {
+            found_bytes: file.len(),
+            why,
+        };
+        // The format begins with the length of its header.
+        let start = file.read(0..file.len().min(LENGTH_BYTES))?;
+        let start = <[u8; LENGTH_BYTES]>::try_from(start.as_slice())
+            .map_err(|_| fault(SafeTensorError::HeaderTooSmall))?;
+        let end = usize::try_from(u64::from_le_bytes(start)).ok();
+        let end = end.and_then(|length| length.checked_add(LENGTH_BYTES));
+        let end = end
+            .filter(|&end| end <= file.len())
+            .ok_or_else(|| fault(SafeTensorError::InvalidHeaderLength))?;
+        let metadata = serde_json::from_slice::<Metadata>(&file.read(LENGTH_BYTES..end)?)
+            .map_err(|why| fault(SafeTensorError::InvalidHeaderDeserialization(why)))?;
+        if end + metadata.data_len() != file.len() {
+            return Err(fault(SafeTensorError::MetadataIncompleteBuffer));
+        }
+        Ok(Self { metadata, end })
+    }
+
+    fn config(&self) -> Result<NetConfig, WeightsError> {
+        let entries = self.metadata.metadata().as_ref();
+        let entry = |key: &str| entries.and_then(|entries| entries.get(key));
+        let config = entry(KEY_CONFIG).ok_or(WeightsError::NotOurs)?;
+        match entry(KEY_VERSION) {
+            Some(version) if version == VERSION => {
+                let config: NetConfig = serde_json::from_str(config)?;
+                config.check()?;
+                Ok(config)
+            }
+            other => Err(WeightsError::Version {
+                found: other.map_or("none", String::as_str).to_owned(),
+            }),
+        }
+    }
+}
+
+fn numbers(
+    name: &str,
+    shape: &[usize],
+    info: &TensorInfo,
+    bytes: &[u8],
+) -> Result<Vec<f32>, WeightsError> {
+    if info.shape != shape {
         return Err(WeightsError::Shape {
             name: name.to_owned(),
             expected: shape.to_vec(),
-            found: view.shape().to_vec(),
+            found: info.shape.clone(),
         });
     }
-    let values: Vec<f32> = match view.dtype() {
+    let values: Vec<f32> = match info.dtype {
         Dtype::F32 => {
-            let words = view.data().as_chunks::<4>().0;
+            let words = bytes.as_chunks::<4>().0;
             words.iter().map(|&word| f32::from_le_bytes(word)).collect()
         }
         Dtype::F16 => {
-            let words = view.data().as_chunks::<2>().0;
+            let words = bytes.as_chunks::<2>().0;
             let halves = words.iter().map(|&word| f16::from_le_bytes(word));
             halves.map(f16::to_f32).collect()
         }

@@ -18,7 +18,8 @@ use common::{SEED, color_alone, open, sample};
 use glam::{DAffine3, IVec3, Vec3};
 use net::{Ipdrecon, NetConfig, View, model::Decoded, planes::Plane};
 use recon::{
-    DepthSource, Flow, Input, Level, Limits, Network, NetworkConfig, Options, Preset, Sink, Stage,
+    DepthSource, Flow, Input, Level, Limits, Network, NetworkConfig, Options, Preset, Seen, Sink,
+    Stage,
 };
 use std::{
     cell::{Cell, RefCell},
@@ -37,6 +38,14 @@ struct Rigged {
 
 impl Network for Rigged {
     type Plane = Plane;
+
+    fn device(&self) -> Device {
+        Network::device(&self.model)
+    }
+
+    fn row_bytes(&self, level: Level) -> usize {
+        Network::row_bytes(&self.model, level)
+    }
 
     fn guided(&self) -> bool {
         false
@@ -57,7 +66,7 @@ impl Network for Rigged {
         views: &[View],
         sites: &[IVec3],
         origin_m: Vec3,
-    ) -> Tensor<2> {
+    ) -> (Tensor<2>, Option<Seen>) {
         Network::fuse(&self.model, level, plane, views, sites, origin_m)
     }
 
@@ -158,6 +167,6 @@ fn main() {
         network.sites.borrow(),
         outcome.volume.brick_count(),
         plan.bricks,
-        plan.device_bytes >> 20,
+        (plan.device_bytes + plan.network_bytes) >> 20,
     );
 }

@@ -54,6 +54,9 @@ pub trait Sink {
         None
     }
 
+    /// Bricks that follow have edges of so many metres, and stand in place of all that were handed over before.
+    fn surface(&mut self, _brick_size_m: f32) {}
+
     /// The surface of some bricks changed: the soup lies on the run's device.
     ///
     /// # Errors
@@ -61,6 +64,19 @@ pub trait Sink {
     #[allow(async_fn_in_trait)]
     async fn bricks(&mut self, _meshes: BrickMeshes) -> Result<(), VolumeError> {
         Ok(())
+    }
+
+    /// Whether what finished stages made is wanted: it takes time and memory to hand over.
+    fn keeps(&self) -> bool {
+        false
+    }
+
+    /// A stage is done, and made this. With it at hand a run of the same plan with the same network goes on after that stage.
+    fn keep(&mut self, _stage: Stage, _made: Vec<u8>) {}
+
+    /// What an earlier run of the same plan made in a stage, as it gave it to [`Sink::keep`]. Asked of a stage once, when it is to begin.
+    fn kept(&mut self, _stage: Stage) -> Option<Vec<u8>> {
+        None
     }
 
     /// Called between any two steps: the place to draw a frame, to wait while paused, or to stop.

@@ -3,6 +3,7 @@
 mod bricks;
 mod network;
 mod options;
+mod time;
 
 use bricks::Foresight;
 pub(crate) use network::working_size;
@@ -10,6 +11,8 @@ pub use network::{NetworkConfig, Preset, ViewChoice};
 pub use options::{DepthSource, Options};
 use scan::{Camera, Frame, KeyframeRule, Scan, keyframes};
 use stereo::{StereoConfig, StereoError};
+pub(crate) use time::{MATCH, SURFACE};
+pub use time::{Rates, Work};
 use volume::{BYTES_PER_BRICK, SurfaceRule, VolumeConfig};
 
 /// A voxel is made this much larger at a time until the volume fits.
@@ -26,6 +29,8 @@ const STEREO_LEAST_WEIGHT: f32 = 0.02;
 pub struct Limits {
     /// The largest buffer that a kernel may see, in bytes.
     pub binding_bytes: usize,
+    /// Whether the network works on the same device, and its tensors are bound by that, too; not so on a processor.
+    pub network_is_bound: bool,
 }
 
 impl Default for Limits {
@@ -33,6 +38,7 @@ impl Default for Limits {
     fn default() -> Self {
         Self {
             binding_bytes: 128 << 20,
+            network_is_bound: false,
         }
     }
 }
@@ -52,8 +58,12 @@ pub struct Plan {
     pub bricks: usize,
     /// Bytes expected on the device: the field with room to grow, the surface, and what stereo works on.
     pub device_bytes: usize,
+    /// Bytes that the network works on, on whichever device that does; 0 without it.
+    pub network_bytes: usize,
     /// Bytes expected on the heap: decoded pictures and what waits for the device.
     pub heap_bytes: usize,
+    /// What there is to do, for the time that it may be expected to take.
+    pub work: Work,
     /// What was turned down and why, in words.
     pub remarks: Vec<String>,
     /// How the volume will be laid out.
@@ -180,23 +190,40 @@ pub fn plan(scan: &Scan, limits: &Limits, options: Options) -> Result<Plan, Plan
         voxel_size_m: volume.voxel_size_m,
         ..options
     };
+    if let DepthSource::Network(config) = &depth {
+        remarks.extend(config.cap_remark(bricks, limits));
+    }
     let fusion = 2 * bricks * BYTES_PER_BRICK
         + bricks * TRIANGLES_PER_BRICK * 3 * mesh::soup::VERTEX_STRIDE_BYTES as usize;
     let working = match &depth {
         DepthSource::Sensor => Bytes::default(),
         DepthSource::Stereo(config) => stereo_bytes(scan, &keyframes, config),
-        DepthSource::Network(config) => network_bytes(&keyframes, config, bricks),
+        // Its guide.
+        DepthSource::Network(_) => stereo_bytes(scan, &keyframes, &StereoConfig::default()),
+    };
+    let network_bytes = match &depth {
+        DepthSource::Network(config) => config.bytes(keyframes.len(), bricks),
+        DepthSource::Sensor | DepthSource::Stereo(_) => 0,
     };
     let pictures = keyframes.iter().map(|&f| picture_bytes(&frames[f], &depth));
+    let scope = time::Scope {
+        scan,
+        keyframes: &keyframes,
+        bricks,
+        bricks_a_view: foresight.bricks_a_view(scan, &volume),
+    };
+    let work = Work::of(&depth, &scope);
     Ok(Plan {
         options,
         depth,
         frames: frames.len(),
         device_bytes: fusion + working.device,
+        network_bytes,
         // The file, its pixels, and the copy on its way to the device.
         heap_bytes: 3 * pictures.max().unwrap_or(0) + working.heap,
         keyframes,
         bricks,
+        work,
         remarks,
         volume,
     })
@@ -267,26 +294,5 @@ fn stereo_bytes(scan: &Scan, keyframes: &[usize], config: &StereoConfig) -> Byte
     Bytes {
         device: 2 * working * config.planes * size_of::<f32>(),
         heap: keyframes.len().min(stereo::VIEWS_KEPT) * working * 4 * size_of::<f32>(),
-    }
-}
-
-/// What the network works on, no more than: every keyframe's feature planes at the full widths, and of the finest lattice
-/// what goes into and through the first layers of its 3D network.
-fn network_bytes(keyframes: &[usize], config: &NetworkConfig, bricks: usize) -> Bytes {
-    let pixels = config.size.0 as usize * config.size.1 as usize;
-    let widest = net::NetConfig::full();
-    let strides = net::Level::ALL.map(net::Level::stride);
-    let planes = widest.planes.iter().zip(strides);
-    let planes: usize = planes
-        .map(|(width, stride)| width * pixels / (stride * stride))
-        .sum();
-    // Base network and its second plane where there is one.
-    let planes = 2 * planes * size_of::<f32>() * keyframes.len();
-    let input = 3 * widest.unet[1] + widest.planes[2] + 1;
-    let through = 2 * (3 * widest.unet[2]);
-    let sites = bricks * volume::BRICK_VOXELS;
-    Bytes {
-        device: planes + sites * (input + through) * size_of::<f32>(),
-        heap: 0,
     }
 }

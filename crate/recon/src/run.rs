@@ -13,7 +13,7 @@ use ::stereo::StereoError;
 use burn::tensor::Device;
 use glam::{Affine3A, Vec3};
 use mesh::camera::Pinhole;
-pub use neural::{Input, Network};
+pub use neural::{Input, Network, Seen, fused_at_once, warm_up_network};
 use scan::{ColorImage, Scan};
 use volume::{DepthView, Volume, VolumeError};
 

@@ -277,6 +277,7 @@ fn what_may_not_fit_gets_larger_voxels_and_a_remark() {
     let scan = open(color_alone(|_, bytes| bytes));
     let tight = Limits {
         binding_bytes: 8 << 20,
+        ..Limits::default()
     };
     let plan = recon::plan(&scan, &tight, options()).unwrap();
     assert!(plan.options.voxel_size_m > 0.04);

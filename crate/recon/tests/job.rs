@@ -161,6 +161,7 @@ fn what_does_not_fit_gets_larger_voxels_and_a_remark() {
     let scan = open(sample());
     let tight = Limits {
         binding_bytes: 4 << 20,
+        ..Limits::default()
     };
     let options = Options {
         voxel_size_m: 0.02,

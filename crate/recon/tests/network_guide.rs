@@ -43,5 +43,6 @@ fn stereo_draws_a_network_that_is_off_towards_the_surface() {
     });
     println!("accuracy when off by 4 cm: {accuracy_m:?} m, without and with stereo");
     assert!(accuracy_m[0] > 0.03, "it is off indeed: {accuracy_m:?}");
-    assert!(accuracy_m[1] < 0.9 * accuracy_m[0], "{accuracy_m:?}");
+    // Its cameras stand 1.5 to 3 m away, where maps weigh a quarter and more.
+    assert!(accuracy_m[1] < 0.95 * accuracy_m[0], "{accuracy_m:?}");
 }

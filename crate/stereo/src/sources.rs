@@ -13,6 +13,8 @@ const BEST_BASELINE_M: f64 = 0.25;
 const BASELINE_SPREAD: f64 = 0.6;
 /// A source sees at least this share of what the keyframe sees.
 const LEAST_OVERLAP: f64 = 0.25;
+/// Keyframes that [`mean_count`] looks at.
+const LOOKED_AT: usize = 16;
 /// Points at which overlap is asked for: a grid of pixels at two depths of a room.
 const GRID: usize = 5;
 const DEPTHS_M: [f64; 2] = [1.5, 3.0];
@@ -34,6 +36,19 @@ pub fn choose(frames: &[Frame], keyframes: &[usize], most: usize) -> Vec<Vec<usi
         scored.into_iter().map(|(_, other)| other).collect()
     };
     keyframes.iter().enumerate().map(best_of).collect()
+}
+
+/// How many sources a keyframe has in the mean, of up to `most`: looked up for some keyframes, evenly spread, to plan by.
+pub fn mean_count(frames: &[Frame], keyframes: &[usize], most: usize) -> f64 {
+    let step = keyframes.len().div_ceil(LOOKED_AT).max(1);
+    let looked_at: Vec<usize> = keyframes.iter().copied().step_by(step).collect();
+    let count = |&reference: &usize| {
+        let others = keyframes.iter().filter(|&&other| other != reference);
+        let scored = others.filter(|&&other| score(&frames[reference], &frames[other]).is_some());
+        scored.take(most).count()
+    };
+    let all: usize = looked_at.iter().map(count).sum();
+    all as f64 / looked_at.len().max(1) as f64
 }
 
 fn score(reference: &Frame, source: &Frame) -> Option<f64> {

@@ -41,6 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             place: *place,
             distance: *sum as f32 / (*rooms as f32 * f32::from(SATURATED)),
             color: None,
+            evidence: volume::Evidence::default(),
         })
         .collect();
     let config = VolumeConfig {

@@ -22,4 +22,4 @@ pub use cpu::CpuPainter;
 pub use gpu::{GpuPainter, Picking, Scene};
 pub use input::{Input, PointerKind};
 pub use lines::{CameraPose, Frusta};
-pub use look::{DEPTH_RAMP, Look, Shading, Theme, Viewport};
+pub use look::{Look, RAMP, Shading, Theme, UNKNOWN, Viewport};

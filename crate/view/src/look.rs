@@ -18,6 +18,11 @@ pub enum Shading {
     Depth,
     /// Colour with the triangles' edges on top.
     Wireframe,
+    /// How sure the measurements are that the surface rests on, 0 to 1 along [`RAMP`]; [`UNKNOWN`] where they have none.
+    Confidence,
+    /// Views that the surface rests on: 1, 2, 4, 8, 16, 32 and more are even steps along [`RAMP`]; [`UNKNOWN`] where that is
+    /// not known.
+    Views,
 }
 
 /// Colours (sRGB) of everything but the surface.
@@ -118,9 +123,15 @@ impl Viewport {
     }
 }
 
-/// The ramp of [`Shading::Depth`], far to near: nine stops evenly spaced in OKLCh lightness (0.26
+/// Views at the light end of [`RAMP`].
+pub(crate) const MANY_VIEWS: f32 = 32.0;
+
+/// What [`Shading::Confidence`] and [`Shading::Views`] show where nothing is known: a grey that is not on the ramp.
+pub const UNKNOWN: [u8; 3] = [128, 128, 128];
+
+/// The ramp of [`Shading::Depth`] (far to near), [`Shading::Confidence`] and [`Shading::Views`] (low to high): nine stops evenly spaced in OKLCh lightness (0.26
 /// to 0.92) while the hue turns from 300 to 95 degrees, chroma at most 0.14 and within sRGB.
-pub const DEPTH_RAMP: [[u8; 3]; 9] = [
+pub const RAMP: [[u8; 3]; 9] = [
     [48, 2, 89],
     [39, 42, 127],
     [3, 81, 138],

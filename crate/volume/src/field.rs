@@ -6,14 +6,14 @@ use burn::{
     tensor::{DType, Device, IndexingUpdateOp, Int, TensorData},
 };
 
-/// Numbers of a voxel's distance sample: the truncated signed distance, then its weight.
-pub(crate) const SAMPLE: usize = 2;
+/// Numbers of a voxel's distance sample: the truncated signed distance, its weight, what it rests on ([`crate::evidence`]).
+pub(crate) const SAMPLE: usize = 3;
 /// Numbers of a voxel's colour: red, green, blue (0 to 255), then the weight of the colour.
 pub(crate) const COLOR: usize = 4;
 
 /// The field's numbers. A row is a brick; its voxels lie x fastest, then y, then z.
 pub(crate) struct Field {
-    /// `[slots, 512 * 2]`
+    /// `[slots, 512 * 3]`
     pub samples: Tensor<2>,
     /// `[slots, 512 * 4]`, or `[1, 512 * 4]` that is never written where there is no colour.
     pub colors: Tensor<2>,
@@ -57,7 +57,7 @@ impl Field {
         }
     }
 
-    /// Overwrites the rows `slots`: 512 * 2 numbers a row of `samples`, 512 * 4 of `colors`.
+    /// Overwrites the rows `slots`: 512 * 3 numbers a row of `samples`, 512 * 4 of `colors`.
     pub fn set(&mut self, slots: Vec<i32>, samples: Vec<f32>, colors: Vec<f32>) {
         let rows = slots.len();
         let slots = TensorData::new(slots, [rows]);

@@ -10,6 +10,7 @@
 mod allocate;
 mod compute;
 mod error;
+mod evidence;
 mod extract;
 mod field;
 mod integrate;
@@ -21,6 +22,7 @@ mod volume;
 pub use error::VolumeError;
 pub use extract::{BrickMeshes, SurfaceRule};
 pub use lattice::{BRICK_EDGE, BRICK_VOXELS, Brick};
+pub use mesh::soup::Evidence;
 pub use points::Point;
 pub use view::DepthView;
 pub use volume::{BYTES_PER_BRICK, Volume, VolumeConfig};

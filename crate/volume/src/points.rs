@@ -1,7 +1,8 @@
 //! A field that is known at single lattice points: how a network's distances come into the volume.
 
 use crate::{
-    Volume, VolumeError,
+    Evidence, Volume, VolumeError,
+    evidence::packed,
     field::{COLOR, SAMPLE},
     lattice::{BRICK_EDGE, BRICK_VOXELS, Brick},
 };
@@ -20,6 +21,8 @@ pub struct Point {
     pub distance: f32,
     /// sRGB, if it is known.
     pub color: Option<[u8; 3]>,
+    /// Which views it rests on; the default where that is not known.
+    pub evidence: Evidence,
 }
 
 impl Volume {
@@ -55,6 +58,7 @@ impl Volume {
                     let at = row * BRICK_VOXELS + local as usize;
                     samples[at * SAMPLE] = point.distance.clamp(-1.0, 1.0);
                     samples[at * SAMPLE + 1] = 1.0;
+                    samples[at * SAMPLE + 2] = packed(point.evidence);
                     if let Some([r, g, b]) = point.color {
                         let color = [r, g, b, 1].map(f32::from);
                         colors[at * COLOR..][..COLOR].copy_from_slice(&color);

@@ -200,7 +200,7 @@ impl Volume {
                 let known = surface(point);
                 let weight = if known.is_some() { 1.0 } else { 0.0 };
                 let (distance_m, rgb) = known.unwrap_or_default();
-                samples.extend([(distance_m / truncation_m).clamp(-1.0, 1.0), weight]);
+                samples.extend([(distance_m / truncation_m).clamp(-1.0, 1.0), weight, 0.0]);
                 colors.extend(rgb.map(f32::from));
                 colors.push(weight);
             }

@@ -6,7 +6,7 @@
 use burn::tensor::Device;
 use glam::{IVec3, Vec3};
 use mesh::Mesh;
-use volume::{Point, Volume, VolumeConfig, VolumeError};
+use volume::{Evidence, Point, Volume, VolumeConfig, VolumeError};
 
 const RADIUS_M: f32 = 0.5;
 
@@ -25,6 +25,11 @@ fn points(config: &VolumeConfig) -> Vec<Point> {
             place,
             distance: distance_m / config.truncation_m,
             color: (at.y >= 0.0).then_some(color),
+            evidence: if at.x < 0.0 {
+                Evidence::new(3, Some(0.25))
+            } else {
+                Evidence::new(20, None)
+            },
         })
     });
     known.collect()

@@ -80,7 +80,7 @@ pub enum InputEvent {
 #[derive(Deserialize, Tsify, Clone, Copy)]
 #[serde(rename_all = "camelCase")]
 pub struct ViewOptions {
-    /// Colour, normal, wireframe or depth.
+    /// What the surface is painted with.
     pub shading: ShadingMode,
     /// The cameras and their path.
     pub cameras: bool,
@@ -104,6 +104,10 @@ pub enum ShadingMode {
     Wireframe,
     /// The distance from the eye.
     Depth,
+    /// How sure the measurements are that the surface rests on.
+    Confidence,
+    /// How many views the surface rests on.
+    Views,
 }
 
 /// Where to put the camera.

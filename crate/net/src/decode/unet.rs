@@ -2,8 +2,10 @@
 
 use super::UNetMaps;
 use crate::ops::{
-    batch_norm::batch_norm,
-    sparse_conv::{KernelMap, sparse_conv},
+    batch_norm::{batch_norm, running_factors},
+    cube,
+    linear::of_rows,
+    sparse_conv::{KernelMap, sparse_conv, sparse_conv_finished},
 };
 use burn::{
     Tensor,
@@ -36,6 +38,31 @@ impl SparseConvolution {
     fn forward(&self, features: Tensor<2>, map: &KernelMap) -> Tensor<2> {
         sparse_conv(features, self.weight.val(), map)
     }
+
+    /// The convolution, its normalisation `norm`, what comes from around it, and where asked a ReLU.
+    fn normed(
+        &self,
+        features: Tensor<2>,
+        map: &KernelMap,
+        norm: &BatchNorm,
+        around: Option<Tensor<2>>,
+        end: bool,
+    ) -> Tensor<2> {
+        let device = features.device();
+        if cube::runs_on(&device) {
+            let (scale, shift) = running_factors(norm, &device);
+            let weight = self.weight.val();
+            return sparse_conv_finished(features, weight, map, [scale, shift], around, end);
+        }
+        let inner = self.forward(features, map);
+        match around {
+            None => batch_norm(norm, inner, end),
+            Some(around) => {
+                let sum = batch_norm(norm, inner, false) + around;
+                if end { relu(sum) } else { sum }
+            }
+        }
+    }
 }
 
 /// A convolution, normalised over the sites, then ReLU.
@@ -57,7 +84,7 @@ impl Step {
     }
 
     fn forward(&self, features: Tensor<2>, map: &KernelMap) -> Tensor<2> {
-        batch_norm(&self.norm, self.conv.forward(features, map), true)
+        self.conv.normed(features, map, &self.norm, None, true)
     }
 }
 
@@ -103,12 +130,12 @@ impl Residual {
     /// Rows `[N, inputs]` to `[N, outputs]`.
     pub fn forward(&self, features: Tensor<2>, map: &KernelMap) -> Tensor<2> {
         let inner = self.first.forward(features.clone(), map);
-        let inner = batch_norm(&self.norm, self.second.forward(inner, map), false);
         let around = match &self.around {
-            Some(around) => batch_norm(&around.norm, around.linear.forward(features), false),
+            Some(around) => batch_norm(&around.norm, of_rows(&around.linear, features), false),
             None => features,
         };
-        relu(inner + around)
+        self.second
+            .normed(inner, map, &self.norm, Some(around), true)
     }
 }
 

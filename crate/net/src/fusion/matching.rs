@@ -2,8 +2,10 @@
 
 use burn::tensor::Tensor;
 
+use crate::ops::cube;
 use crate::ops::pool::{Pooling, pool};
 use crate::ops::segments::Segments;
+use crate::ops::views::fused;
 
 /// Groups of channels that are compared apart.
 pub const GROUPS: usize = 8;
@@ -19,6 +21,11 @@ const SHORT: f32 = 1e-3;
 pub fn likeness(features: Tensor<2>, segments: &Segments) -> Tensor<2> {
     let [pairs, channels] = features.dims();
     let device = features.device();
+    if cube::runs_on(&device) {
+        let nothing = Tensor::zeros([pairs], &device);
+        let mean = pool(features.clone(), nothing, segments, Pooling::Mean);
+        return fused::likeness(features, mean, segments, GROUPS, SHORT);
+    }
     let ones = Tensor::<2>::ones([pairs, 1], &device);
     let lengths = segments.lengths();
     let count = lengths.select(0, segments.of_row.clone()).unsqueeze_dim(1);

@@ -9,7 +9,7 @@ use burn::backend::{Backend, Dispatch, Flex, backend_extension};
 use burn::tensor::{Int, Tensor, TensorData};
 use burn_flex::FlexTensor;
 
-use super::on_processor;
+use super::{cube, on_processor, planar};
 
 /// Samples each of `planes` `[V, C, h, w]` at the affine image of its pixels, bilinearly, the edge repeated outside.
 /// `maps` is `[V, 6]`, rows of `[a11 a12 a13; a21 a22 a23]`: `x' = a11 x + a12 y + a13`, `y' = a21 x + a22 y + a23`, in
@@ -17,13 +17,16 @@ use super::on_processor;
 /// 3.2; torch's `affine_grid` with `align_corners = false`, with `x` times `w / h` before and divided after).
 ///
 /// Where a map leads exactly to a pixel, its gradient is the difference to the next pixel to the right and below. On the
-/// processor one operation that keeps its inputs alone; elsewhere tensor operations.
+/// processor one operation that keeps its inputs alone, on a GPU without gradients one kernel; elsewhere tensor operations.
 pub fn affine_sample(planes: Tensor<4>, maps: Tensor<2>) -> Tensor<4> {
     if on_processor(&planes.device()) {
         return Tensor::from_dispatch(<Dispatch as AffineSampling>::affine_sample(
             planes.into_dispatch(),
             maps.into_dispatch(),
         ));
+    }
+    if cube::runs_on(&planes.device()) {
+        return planar::affine_sample(planes, maps);
     }
     composed(planes, maps)
 }

@@ -10,14 +10,17 @@ use burn::backend::{
     tensor::{FloatTensor, IntTensor},
 };
 use burn::tensor::Tensor;
-use burn_cubecl::CubeBackend;
+use burn_cubecl::{CubeBackend, tensor::CubeTensor};
 
+use super::cube;
 use super::segments::{Segments, Walk, take};
 
 #[cfg(not(target_family = "wasm"))]
 use burn::backend::Autodiff;
 
 pub(crate) mod flex;
+mod forward;
+mod fused;
 
 /// Attention among the rows of each segment. `query`, `key`, `value` are `[P, d]`; `heads` divides `d`.
 pub fn attention(
@@ -89,7 +92,18 @@ pub trait AttentionPasses: Backend {
     }
 }
 
-impl AttentionPasses for CubeBackend {}
+impl AttentionPasses for CubeBackend {
+    fn attention_forward(
+        inputs: [CubeTensor; 3],
+        shared: &Shared<Self>,
+    ) -> (CubeTensor, CubeTensor) {
+        if cube::plain() {
+            let [query, key, value] = inputs;
+            return plain_forward::<Self>(query, key, value, shared);
+        }
+        fused::forward(inputs, shared)
+    }
+}
 
 impl<B: AttentionPasses> AttentionExtension for B {
     fn segment_attention(

@@ -3,13 +3,13 @@
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, Dispatch, Flex, TensorMetadata, backend_extension};
 use burn::nn::BatchNorm;
-use burn::tensor::{Shape, Tensor};
+use burn::tensor::{Device, Shape, Tensor};
 use burn_cubecl::CubeBackend;
 use burn_flex::FlexTensor;
 use rayon::prelude::*;
 
-use super::flex;
 use super::wide::wide;
+use super::{cube, flex, planar};
 
 #[cfg(not(target_family = "wasm"))]
 mod backward;
@@ -19,16 +19,12 @@ mod rows;
 /// As burn's module does it, training takes the batch's statistics and adds them to the running ones.
 pub fn batch_norm<const D: usize>(norm: &BatchNorm, x: Tensor<D>, relu: bool) -> Tensor<D> {
     let device = x.device();
+    if cube::runs_on(&device) {
+        return planar::scaled(norm, x, relu);
+    }
     if !(device.is_autodiff() && norm.training.is_enabled()) {
-        let (mean, variance) = (norm.running_mean.value(), norm.running_var.value());
-        let scale = norm.gamma.val() / (variance.to_device(&device) + norm.epsilon).sqrt();
-        let shift = norm.beta.val() - mean.to_device(&device) * scale.clone();
-        return Tensor::from_dispatch(<Dispatch as BatchNormalisation>::scaled(
-            x.into_dispatch(),
-            scale.into_dispatch(),
-            shift.into_dispatch(),
-            relu,
-        ));
+        let (scale, shift) = running_factors(norm, &device);
+        return scaled(x, scale, shift, relu);
     }
     let (y, mean, variance) = <Dispatch as BatchNormalisation>::normalised(
         x.into_dispatch(),
@@ -44,6 +40,29 @@ pub fn batch_norm<const D: usize>(norm: &BatchNorm, x: Tensor<D>, relu: bool) ->
         running.update(after.detach());
     }
     Tensor::from_dispatch(y)
+}
+
+/// `scale x + shift` of each channel of `x` `[V, C, h, w]` or `[N, C]`, with `scale` and `shift` `[C]`; then, where asked, a ReLU.
+pub fn scaled<const D: usize>(
+    x: Tensor<D>,
+    scale: Tensor<1>,
+    shift: Tensor<1>,
+    relu: bool,
+) -> Tensor<D> {
+    Tensor::from_dispatch(<Dispatch as BatchNormalisation>::scaled(
+        x.into_dispatch(),
+        scale.into_dispatch(),
+        shift.into_dispatch(),
+        relu,
+    ))
+}
+
+/// Scale and shift of each channel by the running statistics.
+pub(crate) fn running_factors(norm: &BatchNorm, device: &Device) -> (Tensor<1>, Tensor<1>) {
+    let (mean, variance) = (norm.running_mean.value(), norm.running_var.value());
+    let scale = norm.gamma.val() / (variance.to_device(device) + norm.epsilon).sqrt();
+    let shift = norm.beta.val() - mean.to_device(device) * scale.clone();
+    (scale, shift)
 }
 
 /// Backends that run [`batch_norm`].

@@ -1,5 +1,7 @@
 //! Layer normalisation of each pixel's channels.
 
+use std::ops::Range;
+
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, Dispatch, Flex, TensorMetadata, backend_extension};
 use burn::tensor::Tensor;
@@ -7,13 +9,16 @@ use burn_flex::FlexTensor;
 use rayon::prelude::*;
 
 use super::wide::wide;
-use super::{flex, on_processor};
+use super::{cube, flex, on_processor, planar};
 
 /// Added to variances.
 const EPSILON: f32 = 1e-5;
+/// Pixels of a task: their channels stay in the nearest caches.
+const PIECE: usize = 1024;
 
 /// `gamma (x - mean) / sqrt(variance + 1e-5) + beta`, mean and variance of each pixel's channels; `x` `[V, C, h, w]`, `gamma`
-/// and `beta` `[C]`. On the processor one operation that keeps its inputs alone; elsewhere tensor operations.
+/// and `beta` `[C]`. On the processor one operation that keeps its inputs alone, on a GPU without gradients one kernel; elsewhere tensor
+/// operations.
 pub fn channel_norm(x: Tensor<4>, gamma: Tensor<1>, beta: Tensor<1>) -> Tensor<4> {
     if on_processor(&x.device()) {
         return Tensor::from_dispatch(<Dispatch as ChannelNormalisation>::channel_norm(
@@ -21,6 +26,9 @@ pub fn channel_norm(x: Tensor<4>, gamma: Tensor<1>, beta: Tensor<1>) -> Tensor<4
             gamma.into_dispatch(),
             beta.into_dispatch(),
         ));
+    }
+    if cube::runs_on(&x.device()) {
+        return planar::channel_norm(x, gamma, beta, EPSILON);
     }
     composed(x, gamma, beta)
 }
@@ -115,17 +123,17 @@ struct Moments {
 }
 
 impl Moments {
-    /// Of `x` `[C, pixels]`.
-    fn new(x: &[f32], pixels: usize) -> Self {
+    /// Of the `piece` of the pixels of `x` `[C, pixels]`.
+    fn new(x: &[f32], pixels: usize, piece: Range<usize>) -> Self {
         let count = (x.len() / pixels) as f32;
-        let mut mean = vec![0.0; pixels];
+        let mut mean = vec![0.0; piece.len()];
         for x in x.chunks_exact(pixels) {
-            add(&mut mean, x);
+            add(&mut mean, &x[piece.clone()]);
         }
         mean.iter_mut().for_each(|mean| *mean /= count);
-        let mut squares = vec![0.0; pixels];
+        let mut squares = vec![0.0; piece.len()];
         for x in x.chunks_exact(pixels) {
-            add_square(&mut squares, x, &mean);
+            add_square(&mut squares, &x[piece.clone()], &mean);
         }
         let scale = squares
             .iter()
@@ -144,13 +152,18 @@ impl ChannelNormalisation for Flex {
         let pixels = height * width;
         let (x, gamma, beta) = (flex::read(x), flex::read(gamma), flex::read(beta));
         let mut out = vec![0.0; x.len()];
-        out.par_chunks_mut(channels * pixels)
-            .zip(x.par_chunks(channels * pixels))
-            .for_each(|(out, x)| {
-                let Moments { mean, scale } = Moments::new(x, pixels);
-                let planes = out.chunks_exact_mut(pixels).zip(x.chunks_exact(pixels));
+        let of_view = pixels.div_ceil(PIECE);
+        flex::pieces(&mut out, channels, pixels, PIECE)
+            .into_par_iter()
+            .enumerate()
+            .for_each(|(task, outs)| {
+                let x = &x[task / of_view * channels * pixels..][..channels * pixels];
+                let first = task % of_view * PIECE;
+                let piece = first..(first + PIECE).min(pixels);
+                let Moments { mean, scale } = Moments::new(x, pixels, piece.clone());
+                let planes = outs.into_iter().zip(x.chunks_exact(pixels));
                 for ((out, x), (gamma, beta)) in planes.zip(gamma.iter().zip(&*beta)) {
-                    normalise(x, &mean, &scale, *gamma, *beta, out);
+                    normalise(&x[piece.clone()], &mean, &scale, *gamma, *beta, out);
                 }
             });
         flex::tensor(out, shape)
@@ -173,7 +186,7 @@ impl ChannelNormalisationGradient for Flex {
             .zip(x.par_chunks(channels * pixels))
             .zip(grad.par_chunks(channels * pixels))
             .map(|((out, x), grad)| {
-                let view = Moments::new(x, pixels);
+                let view = Moments::new(x, pixels, 0..pixels);
                 let (mut sums, mut products) = (vec![0.0; pixels], vec![0.0; pixels]);
                 let planes = || x.chunks_exact(pixels).zip(grad.chunks_exact(pixels));
                 let of_channels = planes()

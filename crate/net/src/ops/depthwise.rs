@@ -8,6 +8,7 @@ use burn_cubecl::CubeBackend;
 use burn_flex::FlexTensor;
 use rayon::prelude::*;
 
+use super::padded::Layout;
 use super::wide::wide;
 use super::{flex, lanes};
 
@@ -55,107 +56,6 @@ impl Depthwise for CubeBackend {}
 fn options(weight: &impl TensorMetadata, stride: usize) -> ConvOptions<2> {
     let [channels, _, kernel, _] = weight.shape().dims();
     ConvOptions::new([stride; 2], [kernel / 2; 2], [1; 2], channels)
-}
-
-/// How a plane is laid out for the loops: padded with zeros, and its rows and columns dealt out by their number modulo the
-/// stride, into `stride^2` parts of `rows * columns`. A kernel tap then is a constant offset, and all pixels of the output
-/// are one run over the part's row length.
-struct Layout {
-    height: usize,
-    width: usize,
-    kernel: usize,
-    stride: usize,
-    rows: usize,
-    columns: usize,
-}
-
-impl Layout {
-    fn new(height: usize, width: usize, kernel: usize, stride: usize) -> Self {
-        let padded = |side: usize| (side + kernel - 1).div_ceil(stride);
-        Self {
-            height,
-            width,
-            kernel,
-            stride,
-            rows: padded(height),
-            columns: padded(width),
-        }
-    }
-
-    fn part(&self) -> usize {
-        self.rows * self.columns
-    }
-
-    /// Numbers of all parts; the last tap's run may end behind the last part.
-    fn len(&self) -> usize {
-        self.stride * self.stride * self.part() + self.reach()
-    }
-
-    fn out(&self) -> [usize; 2] {
-        [self.height, self.width].map(|side| side.div_ceil(self.stride))
-    }
-
-    /// Length of the run that holds all output pixels.
-    fn run(&self) -> usize {
-        self.out()[0] * self.columns
-    }
-
-    /// The largest offset of a tap within its part.
-    fn reach(&self) -> usize {
-        (self.kernel - 1) / self.stride * (self.columns + 1)
-    }
-
-    /// The part that a tap reads, and its offset in there.
-    fn tap(&self, tap: usize) -> (usize, usize) {
-        let (y, x, s) = (tap / self.kernel, tap % self.kernel, self.stride);
-        (y % s * s + x % s, y / s * self.columns + x / s)
-    }
-
-    /// Where row `y` of the plane lies: for columns modulo the stride, the first column's place and the plane's first column.
-    fn row(&self, y: usize) -> impl Iterator<Item = (usize, usize)> {
-        let (s, pad) = (self.stride, self.kernel / 2);
-        let padded = y + pad;
-        let first_row = padded % s * s;
-        let (part, columns) = (self.part(), self.columns);
-        (0..s).map(move |x| {
-            let phase = (x + pad) % s;
-            let start = (first_row + phase) * part + padded / s * columns + (x + pad) / s;
-            (start, x)
-        })
-    }
-
-    /// The plane into the parts; what lies between is zero already.
-    fn deal(&self, plane: &[f32], parts: &mut [f32]) {
-        for (y, row) in plane.chunks_exact(self.width).enumerate() {
-            for (start, first) in self.row(y) {
-                let from = row[first.min(row.len())..].iter().step_by(self.stride);
-                for (to, from) in parts[start..].iter_mut().zip(from) {
-                    *to = *from;
-                }
-            }
-        }
-    }
-
-    /// The parts back into the plane.
-    fn collect(&self, parts: &[f32], plane: &mut [f32]) {
-        for (y, row) in plane.chunks_exact_mut(self.width).enumerate() {
-            for (start, first) in self.row(y) {
-                let length = row.len();
-                let to = row[first.min(length)..].iter_mut().step_by(self.stride);
-                for (to, from) in to.zip(&parts[start..]) {
-                    *to = *from;
-                }
-            }
-        }
-    }
-
-    /// An output plane into a run, after `before` zeros.
-    fn spread(&self, plane: &[f32], before: usize, run: &mut [f32]) {
-        let rows = run[before..].chunks_mut(self.columns);
-        for (to, from) in rows.zip(plane.chunks_exact(self.out()[1])) {
-            to[..from.len()].copy_from_slice(from);
-        }
-    }
 }
 
 /// Numbers that a task's run is cut into: what is added to stays in the nearest cache.
@@ -219,10 +119,7 @@ impl Depthwise for Flex {
                     let weights = kernels.skip(plane % channels).take(1).flatten();
                     let taps: Vec<(usize, f32)> = weights
                         .enumerate()
-                        .map(|(tap, weight)| {
-                            let (part, offset) = layout.tap(tap);
-                            (part * layout.part() + offset, *weight)
-                        })
+                        .map(|(tap, weight)| (layout.offset(tap), *weight))
                         .collect();
                     add_taps(run, parts, &taps);
                     let rows = run.chunks_exact(layout.columns);

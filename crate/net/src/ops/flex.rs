@@ -61,3 +61,26 @@ pub(crate) fn split_rows<'a>(
     }
     split
 }
+
+/// The planes of `table` `[V, C, pixels]` in pieces of `length` pixels, the last of a plane being shorter: for each view and
+/// piece, in this order, the slices of all its channels.
+pub(crate) fn pieces(
+    table: &mut [f32],
+    channels: usize,
+    pixels: usize,
+    length: usize,
+) -> Vec<Vec<&mut [f32]>> {
+    let mut all = Vec::new();
+    for view in table.chunks_exact_mut(channels * pixels) {
+        let first = all.len();
+        all.resize_with(first + pixels.div_ceil(length), || {
+            Vec::with_capacity(channels)
+        });
+        for plane in view.chunks_exact_mut(pixels) {
+            for (piece, part) in all[first..].iter_mut().zip(plane.chunks_mut(length)) {
+                piece.push(part);
+            }
+        }
+    }
+    all
+}

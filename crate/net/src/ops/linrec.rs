@@ -1,13 +1,15 @@
 //! The linear recurrence `s_t = a_t s_{t-1} + x_t` (method 3.7).
 
+mod fused;
+
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, Dispatch, Flex, TensorMetadata, backend_extension};
 use burn::tensor::{Slice, Tensor};
-use burn_cubecl::CubeBackend;
+use burn_cubecl::{CubeBackend, tensor::CubeTensor};
 use burn_flex::FlexTensor;
 use rayon::prelude::*;
 
-use super::flex;
+use super::{cube, flex};
 
 /// `s_t = a_t s_{t-1} + x_t` along the last axis from `s_{-1}` = 0; with `reverse`, `s_t = a_t s_{t+1} + x_t` from the end.
 /// `a` and `x` have the same shape.
@@ -24,50 +26,61 @@ pub fn linrec<const D: usize>(a: Tensor<D>, x: Tensor<D>, reverse: bool) -> Tens
 /// Backends that run [`linrec`].
 #[backend_extension(Cube, Flex, Autodiff: cfg(not(target_family = "wasm")))]
 pub trait LinearRecurrence: Backend {
-    /// See [`linrec`]. This body doubles the reach of each sum in every step (Hillis and Steele): log2 T steps of tensor
-    /// operations.
+    /// See [`linrec`].
     fn linear_recurrence(
         a: FloatTensor<Self>,
         x: FloatTensor<Self>,
         reverse: bool,
     ) -> FloatTensor<Self> {
-        let length = last(&x);
-        let (mut a, mut s) = (a, x);
-        let mut reach = 1;
-        while reach < length {
-            // The sums within reach end at t; those of the rest end at t - reach.
-            let (ends, starts) = if reverse {
-                (0..length - reach, reach..length)
-            } else {
-                (reach..length, 0..length - reach)
-            };
-            let kept = if reverse {
-                length - reach..length
-            } else {
-                0..reach
-            };
-            let join = |kept: FloatTensor<Self>, changed: FloatTensor<Self>| {
-                let axis = kept.shape().num_dims() - 1;
-                let parts = if reverse {
-                    vec![changed, kept]
-                } else {
-                    vec![kept, changed]
-                };
-                Self::float_cat(parts, axis)
-            };
-            let a_ends = part::<Self>(&a, ends.clone());
-            let added = Self::float_mul(a_ends.clone(), part::<Self>(&s, starts.clone()));
-            let changed = Self::float_add(part::<Self>(&s, ends), added);
-            s = join(part::<Self>(&s, kept.clone()), changed);
-            let product = Self::float_mul(a_ends, part::<Self>(&a, starts));
-            a = join(part::<Self>(&a, kept), product);
-            reach *= 2;
-        }
-        s
+        plain::<Self>(a, x, reverse)
     }
 }
 
-impl LinearRecurrence for CubeBackend {}
+/// The recurrence in tensor operations: each step doubles the reach of the sums (Hillis and Steele), so that there are log2 T.
+pub fn plain<B: Backend>(a: FloatTensor<B>, x: FloatTensor<B>, reverse: bool) -> FloatTensor<B> {
+    let length = last(&x);
+    let (mut a, mut s) = (a, x);
+    let mut reach = 1;
+    while reach < length {
+        // The sums within reach end at t; those of the rest end at t - reach.
+        let (ends, starts) = if reverse {
+            (0..length - reach, reach..length)
+        } else {
+            (reach..length, 0..length - reach)
+        };
+        let kept = if reverse {
+            length - reach..length
+        } else {
+            0..reach
+        };
+        let join = |kept: FloatTensor<B>, changed: FloatTensor<B>| {
+            let axis = kept.shape().num_dims() - 1;
+            let parts = if reverse {
+                vec![changed, kept]
+            } else {
+                vec![kept, changed]
+            };
+            B::float_cat(parts, axis)
+        };
+        let a_ends = part::<B>(&a, ends.clone());
+        let added = B::float_mul(a_ends.clone(), part::<B>(&s, starts.clone()));
+        let changed = B::float_add(part::<B>(&s, ends), added);
+        s = join(part::<B>(&s, kept.clone()), changed);
+        let product = B::float_mul(a_ends, part::<B>(&a, starts));
+        a = join(part::<B>(&a, kept), product);
+        reach *= 2;
+    }
+    s
+}
+
+impl LinearRecurrence for CubeBackend {
+    fn linear_recurrence(a: CubeTensor, x: CubeTensor, reverse: bool) -> CubeTensor {
+        if cube::plain() {
+            return plain::<Self>(a, x, reverse);
+        }
+        fused::linear_recurrence(a, x, reverse)
+    }
+}
 
 impl LinearRecurrence for Flex {
     fn linear_recurrence(a: FlexTensor, x: FlexTensor, reverse: bool) -> FlexTensor {

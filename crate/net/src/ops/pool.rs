@@ -7,14 +7,16 @@ use burn::backend::{
     tensor::{FloatTensor, IntTensor},
 };
 use burn::tensor::Tensor;
-use burn_cubecl::CubeBackend;
+use burn_cubecl::{CubeBackend, tensor::CubeTensor};
 
+use super::cube;
 use super::segments::{Segments, Walk, take};
 
 #[cfg(not(target_family = "wasm"))]
 use burn::backend::Autodiff;
 
 mod flex;
+mod fused;
 
 /// How rows are weighed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,7 +99,18 @@ pub trait PoolPasses: Backend {
     }
 }
 
-impl PoolPasses for CubeBackend {}
+impl PoolPasses for CubeBackend {
+    fn pool_forward(
+        tokens: CubeTensor,
+        logits: CubeTensor,
+        shared: &Shared<Self>,
+    ) -> (CubeTensor, CubeTensor) {
+        if cube::plain() {
+            return plain_forward::<Self>(tokens, logits, shared);
+        }
+        fused::forward(tokens, logits, shared)
+    }
+}
 
 impl<B: PoolPasses> PoolExtension for B {
     fn segment_pool(

@@ -9,14 +9,16 @@ use burn::backend::{
     tensor::{FloatTensor, IntTensor},
 };
 use burn::tensor::{IndexingUpdateOp, Int, Tensor};
-use burn_cubecl::CubeBackend;
+use burn_cubecl::{CubeBackend, tensor::CubeTensor};
 
+use super::cube;
 use super::segments::take;
 
 #[cfg(not(target_family = "wasm"))]
 use burn::backend::Autodiff;
 
 pub(crate) mod flex;
+mod fused;
 
 /// Where rows are read from a table of planes, pixel by pixel: row `x + width * (y + height * view)`.
 #[derive(Clone, Debug)]
@@ -86,7 +88,14 @@ pub trait RowsPasses: Backend {
     }
 }
 
-impl RowsPasses for CubeBackend {}
+impl RowsPasses for CubeBackend {
+    fn rows_forward(table: CubeTensor, at: &At<Self>) -> CubeTensor {
+        if cube::plain() {
+            return plain_forward::<Self>(table, at);
+        }
+        fused::forward(table, at)
+    }
+}
 
 impl<B: RowsPasses> RowsExtension for B {
     fn sample_rows(

@@ -3,6 +3,7 @@
 #[cfg(not(target_family = "wasm"))]
 mod backward;
 mod flex;
+mod fused;
 
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, Dispatch, Flex, backend_extension};
@@ -10,7 +11,7 @@ use burn::tensor::{Tensor, activation::softplus};
 use burn_flex::FlexTensor;
 
 use super::linrec::linrec;
-use super::on_processor;
+use super::{cube, on_processor};
 
 /// Which way a scan goes, and how its input is scaled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,8 +27,8 @@ pub enum Pass {
 /// `forward_t = a_t forward_{t-1} + v_t`, `backward_t = a_t backward_{t+1} + v_t`, `a = e^{du}`, `v = gain(d, u) x`,
 /// `d = softplus(step)`, `u = -e^{log_rate}`.
 ///
-/// `x` and `step` are `[V, M, h, w]`, `log_rate` is `[M]`. On the processor one operation that keeps its inputs alone; elsewhere
-/// tensor operations around [`linrec`].
+/// `x` and `step` are `[V, M, h, w]`, `log_rate` is `[M]`. On the processor one operation that keeps its inputs alone, on a GPU
+/// without gradients one kernel; elsewhere tensor operations around [`linrec`].
 pub fn selective_scan(x: Tensor<4>, step: Tensor<4>, log_rate: Tensor<1>, pass: Pass) -> Tensor<4> {
     assert_eq!(x.dims(), step.dims(), "inputs and steps of a scan");
     if on_processor(&x.device()) {
@@ -37,6 +38,9 @@ pub fn selective_scan(x: Tensor<4>, step: Tensor<4>, log_rate: Tensor<1>, pass: 
             log_rate.into_dispatch(),
             pass,
         ));
+    }
+    if cube::runs_on(&x.device()) {
+        return fused::scan(x, step, log_rate, pass);
     }
     composed(x, step, log_rate, pass)
 }

@@ -4,10 +4,10 @@
 #[cfg(not(target_family = "wasm"))]
 mod backward;
 mod flex;
-mod register;
+pub(crate) mod fused;
 mod tile;
 
-use super::flex as slices;
+use super::{cube, flex as slices};
 use burn::{
     Tensor,
     backend::{
@@ -16,7 +16,7 @@ use burn::{
     },
     tensor::{DType, Device, Int, Shape, TensorData},
 };
-use burn_cubecl::CubeBackend;
+use burn_cubecl::{CubeBackend, tensor::CubeTensor};
 use burn_flex::FlexTensor;
 
 /// Gathered rows take at most this much at a time: half of what WebGPU guarantees for a binding.
@@ -72,6 +72,26 @@ pub fn sparse_conv(features: Tensor<2>, weight: Tensor<3>, map: &KernelMap) -> T
     ))
 }
 
+/// [`sparse_conv`], then `scale` times it plus `shift`, channel by channel, plus `added` `[outputs, O]`, then, where asked, a ReLU; on
+/// a device that [`cube::runs_on`] is true of.
+pub(crate) fn sparse_conv_finished(
+    features: Tensor<2>,
+    weight: Tensor<3>,
+    map: &KernelMap,
+    factors: [Tensor<1>; 2],
+    added: Option<Tensor<2>>,
+    relu: bool,
+) -> Tensor<2> {
+    let finish = fused::Finish {
+        factors: Some(factors.map(cube::numbers)),
+        added: added.map(cube::numbers),
+        relu,
+    };
+    let gather = cube::whole_numbers(map.gather.clone());
+    let (features, weight) = (cube::numbers(features), cube::numbers(weight));
+    cube::tensor(fused::convolve(features, weight, gather, finish))
+}
+
 /// The operation for burn's backends. Features `[M, I]`, weight `[K, I, O]`, gather `[N, K]`, scatter `[M, K]`.
 #[backend_extension(Cube, Flex, Autodiff: cfg(not(target_family = "wasm")))]
 pub trait SparseConv: Backend {
@@ -82,15 +102,7 @@ pub trait SparseConv: Backend {
         gather: IntTensor<Self>,
         _scatter: IntTensor<Self>,
     ) -> FloatTensor<Self> {
-        let [_, inputs, outputs] = weight.shape().dims();
-        let [rows, taps] = gather.shape().dims();
-        let weight = Self::float_reshape(weight, Shape::new([taps * inputs, outputs]));
-        let features = with_zero_row::<Self>(features);
-        let blocks = blocks(rows, taps * inputs).map(|block| {
-            let gathered = gathered::<Self>(&features, &gather, block);
-            Self::float_matmul(gathered, weight.clone())
-        });
-        joined::<Self>(blocks.collect())
+        plain_forward::<Self>(features, weight, gather)
     }
 
     /// The gradient of the weight `[K, I, O]`, given that of the output `[N, O]`.
@@ -161,7 +173,41 @@ impl SparseConv for Flex {
     }
 }
 
-impl SparseConv for CubeBackend {}
+impl SparseConv for CubeBackend {
+    fn sparse_conv(
+        features: CubeTensor,
+        weight: CubeTensor,
+        gather: CubeTensor,
+        _scatter: CubeTensor,
+    ) -> CubeTensor {
+        if cube::plain() {
+            return plain_forward::<Self>(features, weight, gather);
+        }
+        let finish = fused::Finish {
+            factors: None,
+            added: None,
+            relu: false,
+        };
+        fused::convolve(features, weight, gather, finish)
+    }
+}
+
+/// The operation in tensor operations, with what lies under the taps gathered into memory.
+pub fn plain_forward<B: Backend>(
+    features: FloatTensor<B>,
+    weight: FloatTensor<B>,
+    gather: IntTensor<B>,
+) -> FloatTensor<B> {
+    let [_, inputs, outputs] = weight.shape().dims();
+    let [rows, taps] = gather.shape().dims();
+    let weight = B::float_reshape(weight, Shape::new([taps * inputs, outputs]));
+    let features = with_zero_row::<B>(features);
+    let blocks = blocks(rows, taps * inputs).map(|block| {
+        let gathered = gathered::<B>(&features, &gather, block);
+        B::float_matmul(gathered, weight.clone())
+    });
+    joined::<B>(blocks.collect())
+}
 
 /// Rows whose gathered copies of `width` numbers each stay within [`GATHERED_BYTES`].
 fn blocks(rows: usize, width: usize) -> impl Iterator<Item = std::ops::Range<usize>> {

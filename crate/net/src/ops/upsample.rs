@@ -7,14 +7,17 @@ use burn_flex::FlexTensor;
 use rayon::prelude::*;
 
 use super::wide::wide;
-use super::{flex, on_processor};
+use super::{cube, flex, on_processor, planar};
 
 /// Twice the height and width, bilinear, with half-pixel centres (`align_corners = false`): output `2 i` is
-/// `(x_{i-1} + 3 x_i) / 4`, output `2 i + 1` is `(3 x_i + x_{i+1}) / 4`, and the edge repeats. On the processor one operation;
-/// elsewhere tensor operations, since burn's own has no gradient on a GPU.
+/// `(x_{i-1} + 3 x_i) / 4`, output `2 i + 1` is `(3 x_i + x_{i+1}) / 4`, and the edge repeats. On the processor one operation,
+/// on a GPU without gradients one kernel; elsewhere tensor operations, since burn's own has no gradient on a GPU.
 pub fn upsample2(x: Tensor<4>) -> Tensor<4> {
     if on_processor(&x.device()) {
         return Tensor::from_dispatch(<Dispatch as Upsampling>::upsample2(x.into_dispatch()));
+    }
+    if cube::runs_on(&x.device()) {
+        return planar::upsample2(x);
     }
     composed(x)
 }

@@ -21,6 +21,7 @@ use burn::backend::Autodiff;
 mod block;
 #[cfg_attr(target_family = "wasm", allow(dead_code))]
 mod flex;
+pub(crate) mod fused;
 #[cfg_attr(target_family = "wasm", allow(dead_code))]
 mod layer;
 #[cfg_attr(target_family = "wasm", allow(dead_code))]

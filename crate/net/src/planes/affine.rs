@@ -5,7 +5,7 @@ use burn::nn::{Initializer, Linear, LinearConfig};
 use burn::tensor::{Device, Tensor, activation::sigmoid};
 
 use super::layer::{of_channels, pooled};
-use crate::ops::affine::affine_sample;
+use crate::ops::{affine::affine_sample, linear::of_rows};
 
 /// `AP(p) = bilinear(R, A p) * b_c`: the plane seen through an affine map that its own mean decides, per view.
 #[derive(Module, Debug)]
@@ -31,7 +31,7 @@ impl AffineCompensation {
     pub fn forward(&self, planes: Tensor<4>) -> Tensor<4> {
         let identity = [[1.0, 0.0, 0.0, 0.0, 1.0, 0.0]];
         let identity = Tensor::<2>::from_floats(identity, &planes.device());
-        let maps = self.map.forward(pooled(planes.clone())) + identity;
+        let maps = of_rows(&self.map, pooled(planes.clone())) + identity;
         affine_sample(planes, maps) * of_channels(sigmoid(self.gain.val()))
     }
 }

@@ -8,6 +8,7 @@ use burn::tensor::{Device, Tensor};
 
 use super::layer::{ChannelNorm, convolved, pointwise, pooled};
 use super::scan::{SeparableScan, rank};
+use crate::ops::linear::of_rows;
 
 /// `State = scan(project(CR)) + B(CR)`, `S = out(State)`, `Q = W_s S + W_f F + b`.
 #[derive(Module, Debug)]
@@ -45,7 +46,7 @@ impl SpatialDecoding {
 
     /// `S`, `[V, C, h, w]`.
     pub fn spatial(&self, compensated: Tensor<4>) -> Tensor<4> {
-        let shift = self.shift.forward(pooled(compensated.clone()));
+        let shift = of_rows(&self.shift, pooled(compensated.clone()));
         let [views, states] = shift.dims();
         let input = convolved(&self.project, self.norm.forward(compensated.clone()));
         let state = self.scan.forward(input, compensated) + shift.reshape([views, states, 1, 1]);

@@ -5,9 +5,12 @@ use burn::nn::conv::{Conv2d, Conv2dConfig};
 use burn::nn::{BatchNorm, BatchNormConfig, Initializer, PaddingConfig2d};
 use burn::tensor::{Device, Tensor};
 
-use crate::ops::batch_norm::batch_norm;
+use crate::ops::batch_norm::{batch_norm, running_factors};
 use crate::ops::channel_norm::channel_norm;
+use crate::ops::cube;
 use crate::ops::depthwise::depthwise;
+use crate::ops::folded::{self, folded};
+use crate::ops::planar;
 use crate::ops::pointwise::pointwise as linear;
 
 /// A linear layer of each pixel's channels, with bias, as a 1x1 convolution.
@@ -36,6 +39,17 @@ pub(super) fn kaiming(fan_out_only: bool) -> Initializer {
 /// What `conv` gives, by the operation that suits its shape.
 pub(super) fn convolved(conv: &Conv2d, x: Tensor<4>) -> Tensor<4> {
     let weight = conv.weight.val();
+    let device = x.device();
+    if cube::runs_on(&device) {
+        return planar::convolved(conv, None, false, x);
+    }
+    if cube::NO_OTHER || folded::runs_on(&device) {
+        let [outputs, ..] = weight.dims();
+        let bias = conv.bias.as_ref().map(|bias| bias.val());
+        let shift = bias.unwrap_or_else(|| Tensor::zeros([outputs], &device));
+        let scale = Tensor::ones([outputs], &device);
+        return folded(x, weight, [scale, shift], conv.stride[0], false);
+    }
     if conv.kernel_size == [1, 1] {
         linear(x, weight, conv.bias.as_ref().map(|bias| bias.val()))
     } else if conv.groups > 1 {
@@ -91,6 +105,15 @@ impl ConvNorm {
     }
 
     pub(super) fn forward(&self, x: Tensor<4>) -> Tensor<4> {
+        let device = x.device();
+        if cube::runs_on(&device) {
+            return planar::convolved(&self.conv, Some(&self.norm), self.relu, x);
+        }
+        if cube::NO_OTHER || folded::runs_on(&device) {
+            let (scale, shift) = running_factors(&self.norm, &device);
+            let (weight, stride) = (self.conv.weight.val(), self.conv.stride[0]);
+            return folded(x, weight, [scale, shift], stride, self.relu);
+        }
         batch_norm(&self.norm, convolved(&self.conv, x), self.relu)
     }
 }

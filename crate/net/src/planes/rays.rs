@@ -7,8 +7,10 @@ use burn::nn::Initializer;
 use burn::nn::conv::Conv2d;
 use burn::tensor::{Device, Tensor, TensorData};
 use glam::Vec2;
+use rayon::prelude::*;
 
 use super::layer::{convolved, pointwise};
+use crate::ops::flex::pieces;
 use crate::{Level, View};
 
 /// Octaves of the encoding.
@@ -49,24 +51,30 @@ impl RayEncoding {
 pub fn encoded(views: &[View], width: usize, height: usize, stride: usize) -> Vec<f32> {
     let pixels = width * height;
     let mut all = vec![0.0; views.len() * CHANNELS * pixels];
-    for (view, of_view) in views.iter().zip(all.chunks_exact_mut(CHANNELS * pixels)) {
-        for pixel in 0..pixels {
-            let at = Vec2::new((pixel % width) as f32, (pixel / width) as f32) * stride as f32;
-            let ray = view
-                .world_from_camera
-                .transform_vector3(view.camera.ray(at))
-                .normalize()
-                .to_array();
-            for (axis, d) in ray.into_iter().enumerate() {
-                of_view[axis * pixels + pixel] = d;
-                for octave in 0..OCTAVES {
-                    let (sine, cosine) = (2.0_f32.powi(octave) * PI * d).sin_cos();
-                    let channel = 3 + 6 * octave as usize + axis;
-                    of_view[channel * pixels + pixel] = sine;
-                    of_view[(channel + 3) * pixels + pixel] = cosine;
+    pieces(&mut all, CHANNELS, pixels, width)
+        .into_par_iter()
+        .enumerate()
+        .for_each(|(row, mut channels)| {
+            let (view, y) = (&views[row / height], row % height);
+            // Across the channels: no one of them can be walked instead.
+            #[allow(clippy::needless_range_loop)]
+            for x in 0..width {
+                let at = Vec2::new(x as f32, y as f32) * stride as f32;
+                let ray = view
+                    .world_from_camera
+                    .transform_vector3(view.camera.ray(at))
+                    .normalize()
+                    .to_array();
+                for (axis, d) in ray.into_iter().enumerate() {
+                    channels[axis][x] = d;
+                    for octave in 0..OCTAVES {
+                        let (sine, cosine) = (2.0_f32.powi(octave) * PI * d).sin_cos();
+                        let channel = 3 + 6 * octave as usize + axis;
+                        channels[channel][x] = sine;
+                        channels[channel + 3][x] = cosine;
+                    }
                 }
             }
-        }
-    }
+        });
     all
 }

@@ -52,6 +52,21 @@ impl Foresight {
         Self::Box((high - low).max(DVec3::ZERO))
     }
 
+    /// Bricks that one keyframe's depth needs, where there is depth to count them by.
+    pub fn bricks_a_view(&self, scan: &Scan, volume: &VolumeConfig) -> Option<f64> {
+        let Self::Sampled(samples, _) = self else {
+            return None;
+        };
+        // Three say enough.
+        let some = samples.iter().step_by(samples.len().div_ceil(3).max(1));
+        let counts = some.map(|(frame, depth)| {
+            let view = depth_view(&scan.frames()[*frame], depth, None);
+            volume.bricks_of(&view).len() as f64
+        });
+        let counts: Vec<f64> = counts.collect();
+        (!counts.is_empty()).then(|| counts.iter().sum::<f64>() / counts.len() as f64)
+    }
+
     /// Bricks that all keyframes together need.
     pub fn bricks(&self, scan: &Scan, volume: &VolumeConfig) -> usize {
         match self {

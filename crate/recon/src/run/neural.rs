@@ -2,12 +2,16 @@
 //! the volume (method 1.3 to 1.7). Levels are done one after another over the whole scan, for the 3D network sees it at once.
 
 mod color;
+mod evidence;
 mod explain;
 mod guide;
+mod kept;
 mod levels;
 mod network;
 mod pictures;
+mod preview;
 mod tiles;
+mod warm;
 
 use super::{Fusion, RunError};
 use crate::{
@@ -15,13 +19,17 @@ use crate::{
     plan::NetworkConfig,
 };
 use burn::tensor::Device;
+pub use evidence::Seen;
 use levels::Field;
+pub use levels::fused_at_once;
 use net::Level;
 pub use network::{Input, Network};
 use pictures::Pictures;
+use preview::Preview;
 use scan::Scan;
 use tiles::Tiling;
-use volume::Point;
+use volume::{BRICK_EDGE, Point};
+pub use warm::warm_up_network;
 
 /// Reconstructs the scan and fills the volume. A keyframe whose picture cannot be decoded is reported and left out. When
 /// the sink stops it before the finest level is done, the volume is empty.
@@ -45,6 +53,7 @@ pub(super) async fn fuse(
         .into_iter()
         .for_each(|finding| sink.finding(finding));
 
+    let thinks_on = network.device();
     let used = tiling.used();
     sink.stage(Stage::Features, used.len());
     let mut pictures = Pictures::new(scan, keyframes, config.size);
@@ -53,7 +62,7 @@ pub(super) async fn fuse(
             fusion.stopped = true;
             return Ok(());
         }
-        if let Some((image, view)) = pictures.load(scan, keyframe, device, sink) {
+        if let Some((image, view)) = pictures.load(scan, keyframe, &thinks_on, sink) {
             pictures.keep(keyframe, view, network.planes(image, &[view]));
             fusion.frames += 1;
         }
@@ -68,7 +77,7 @@ pub(super) async fn fuse(
 
     let guide = match network.guided() {
         false => None,
-        true => match guide::maps(scan, keyframes, device, sink).await? {
+        true => match guide::maps(scan, keyframes, &thinks_on, sink).await? {
             Some(maps) => Some(maps),
             None => {
                 fusion.stopped = true;
@@ -81,7 +90,12 @@ pub(super) async fn fuse(
         pictures: &pictures,
         guide: guide.as_deref(),
     };
-    let field = levels::decode(&scene, network, device, sink).await;
+    let preview = Preview {
+        config: *fusion.volume.config(),
+        device,
+        corner: tiling.corner,
+    };
+    let field = levels::decode(&scene, network, &preview, sink).await;
     let field = match field.map_err(|fault| explain::fault(fault, scan, keyframes))? {
         Some(field) => field,
         None => {
@@ -99,6 +113,7 @@ pub(super) async fn fuse(
     }
     let mut points = points(&field, &tiling);
     fill(fusion, &points)?;
+    sink.surface(Level::Fine.voxel_size_m() * BRICK_EDGE as f32);
     fusion.hand_over(sink, |_, _| ()).await?;
     if fusion.stopped || !fusion.volume.config().color {
         return Ok(());
@@ -120,10 +135,12 @@ pub(super) async fn fuse(
 fn points(field: &Field, tiling: &Tiling) -> Vec<Point> {
     let known = field.sites.iter().zip(&field.distances);
     known
-        .map(|(&site, &distance)| Point {
+        .enumerate()
+        .map(|(index, (&site, &distance))| Point {
             place: tiling.corner + site,
             distance,
             color: None,
+            evidence: field.evidence.get(index).copied().unwrap_or_default(),
         })
         .collect()
 }

@@ -10,7 +10,7 @@ use glam::{DAffine3, IVec3, Vec3};
 use mesh::Mesh;
 use net::{View, model::Decoded};
 use recon::{
-    DepthSource, Input, Level, Limits, Network, NetworkConfig, Options, Outcome, RunError,
+    DepthSource, Input, Level, Limits, Network, NetworkConfig, Options, Outcome, RunError, Seen,
 };
 use scan::Scan;
 use std::cell::RefCell;
@@ -129,7 +129,7 @@ impl Network for Oracle {
         views: &[View],
         sites: &[IVec3],
         origin_m: Vec3,
-    ) -> Tensor<2> {
+    ) -> (Tensor<2>, Option<Seen>) {
         assert_eq!(*plane, views.len());
         if level == Level::Coarse {
             let points = sites
@@ -143,7 +143,21 @@ impl Network for Oracle {
         self.blocks
             .borrow_mut()
             .push((level, views.len(), sites.len()));
-        self.column(sites.iter().map(|&site| mark(site)).collect())
+        // As far as it goes: two views of everything, half sure.
+        let seen = (level == Level::Fine).then(|| Seen {
+            views: vec![2; sites.len()],
+            confidence: Some(Tensor::full([sites.len()], 0.5, &self.device)),
+        });
+        let marks = sites.iter().map(|&site| mark(site)).collect();
+        (self.column(marks), seen)
+    }
+
+    fn device(&self) -> Device {
+        self.device.clone()
+    }
+
+    fn row_bytes(&self, _: Level) -> usize {
+        size_of::<f32>()
     }
 
     fn guided(&self) -> bool {

@@ -2,9 +2,9 @@
 
 use super::raster::{Hit, to_screen};
 use crate::OrbitCamera;
-use crate::look::{DEPTH_RAMP, Look, Shading, Viewport, unit};
+use crate::look::{Look, MANY_VIEWS, RAMP, Shading, UNKNOWN, Viewport, unit};
 use glam::{FloatExt, Mat4, Vec2, Vec3};
-use mesh::soup::{VERTEX_FLOATS, decode};
+use mesh::soup::{Evidence, VERTEX_FLOATS, decode};
 
 pub(super) struct Shader<'a> {
     look: &'a Look,
@@ -36,6 +36,7 @@ impl<'a> Shader<'a> {
     pub(super) fn color(&self, hit: &Hit, soup: &[f32]) -> [u8; 3] {
         let start = hit.triangle as usize * 3 * VERTEX_FLOATS;
         let (corners, _) = soup[start..].as_chunks::<VERTEX_FLOATS>();
+        let evidence = [0, 1, 2].map(|i| Evidence::of(&corners[i]));
         let corners = [0, 1, 2].map(|i| decode(&corners[i]));
         let shares = Vec3::new(1.0 - hit.second - hit.third, hit.second, hit.third);
         let mix = |of: fn(&(Vec3, Vec3, [u8; 3])) -> Vec3| {
@@ -45,13 +46,16 @@ impl<'a> Shader<'a> {
         let normal = mix(|corner| corner.1).normalize_or_zero() * side;
         let color = match self.look.shading {
             Shading::Normal => normal * 0.5 + 0.5,
-            Shading::Depth => self.ramp(hit.inverse_depth.recip()),
-            Shading::Color | Shading::Wireframe => {
+            Shading::Depth => self.of_depth(hit.inverse_depth.recip()),
+            shading => {
                 let position = mix(|corner| corner.0);
                 let to_eye = (self.eye_m - position).normalize_or_zero();
-                let lit = mix(|corner| unit(corner.2)) * light(normal, to_eye).powf(1.0 / 2.2);
-                if self.look.shading == Shading::Color {
+                let shade = light(normal, to_eye).powf(1.0 / 2.2);
+                let lit = mix(|corner| unit(corner.2)) * shade;
+                if shading == Shading::Color {
                     lit
+                } else if shading != Shading::Wireframe {
+                    self.of_evidence(evidence, shares) * 1.0.lerp(shade, 0.4)
                 } else {
                     let theme = &self.look.theme;
                     let edge = self.edge(shares, corners.map(|corner| corner.0));
@@ -63,12 +67,23 @@ impl<'a> Shader<'a> {
         (color * 255.0).round().to_array().map(|c| c as u8)
     }
 
-    fn ramp(&self, depth_m: f32) -> Vec3 {
+    fn of_depth(&self, depth_m: f32) -> Vec3 {
         let [near, far] = self.depth_range_m;
-        let last = DEPTH_RAMP.len() - 1;
-        let t = ((far - depth_m) / (far - near)).clamp(0.0, 1.0) * last as f32;
-        let stop = (t as usize).min(last - 1);
-        unit(DEPTH_RAMP[stop]).lerp(unit(DEPTH_RAMP[stop + 1]), t - stop as f32)
+        ramp((far - depth_m) / (far - near))
+    }
+
+    fn of_evidence(&self, corners: [Evidence; 3], shares: Vec3) -> Vec3 {
+        let mix = |of: fn(Evidence) -> f32| Vec3::from_array(corners.map(of)).dot(shares);
+        let (known, share) = if self.look.shading == Shading::Views {
+            let views = mix(|corner| corner.views() as f32);
+            (views, views.max(1.0).log2() / MANY_VIEWS.log2())
+        } else {
+            let known = mix(|corner| f32::from(corner.confidence().is_some()));
+            let confidence = mix(|corner| corner.confidence().unwrap_or(0.0));
+            (known, confidence / known.max(0.5))
+        };
+        let known = known >= 0.5;
+        if known { ramp(share) } else { unit(UNKNOWN) }
     }
 
     /// How much of an edge the pixel shows. The change of a share over one pixel is the same all over the triangle.
@@ -85,6 +100,13 @@ impl<'a> Shader<'a> {
         let crowd = per_px.into_iter().fold(0.0, f32::max);
         line.lerp(0.35, smoothstep(0.7 - 0.2, crowd - 0.2))
     }
+}
+
+fn ramp(share: f32) -> Vec3 {
+    let last = RAMP.len() - 1;
+    let t = share.clamp(0.0, 1.0) * last as f32;
+    let stop = (t as usize).min(last - 1);
+    unit(RAMP[stop]).lerp(unit(RAMP[stop + 1]), t - stop as f32)
 }
 
 fn light(normal: Vec3, to_eye: Vec3) -> f32 {

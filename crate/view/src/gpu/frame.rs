@@ -1,6 +1,6 @@
 //! What the shaders are told about one picture (`View` in view.wgsl).
 
-use crate::look::{DEPTH_RAMP, Look, Shading, Viewport, depth_range_m, unit};
+use crate::look::{Look, MANY_VIEWS, RAMP, Shading, UNKNOWN, Viewport, depth_range_m, unit};
 use crate::{Arena, OrbitCamera};
 use glam::{Mat4, Vec3};
 
@@ -17,6 +17,7 @@ pub(super) struct Frame {
     depth_range_m: [f32; 2],
     wire: [f32; 4],
     background: [f32; 4],
+    unknown: [f32; 4],
     ramp: [[f32; 4]; 9],
 }
 
@@ -38,6 +39,8 @@ impl Frame {
                 Shading::Normal => 1,
                 Shading::Depth => 2,
                 Shading::Wireframe => 3,
+                Shading::Confidence => 4,
+                Shading::Views => 5,
             },
             forward: camera.axes().2.to_array(),
             target_is_srgb: target_is_srgb.into(),
@@ -45,7 +48,8 @@ impl Frame {
             depth_range_m: depth_range_m(camera, arena.bounds()),
             wire: with(look.theme.wire, viewport.scale),
             background: with(look.theme.background, 1.0),
-            ramp: DEPTH_RAMP.map(|rgb| with(rgb, 1.0)),
+            unknown: with(UNKNOWN, MANY_VIEWS.log2()),
+            ramp: RAMP.map(|rgb| with(rgb, 1.0)),
         }
     }
 }

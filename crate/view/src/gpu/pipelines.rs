@@ -67,7 +67,7 @@ impl Pipelines {
                         array_stride: VERTEX_STRIDE_BYTES,
                         step_mode: wgpu::VertexStepMode::Vertex,
                         attributes: &wgpu::vertex_attr_array![
-                            0 => Float32x3, 1 => Float32, 2 => Float32
+                            0 => Float32x3, 1 => Float32, 2 => Float32, 3 => Float32
                         ],
                     },
                     cull_mode,

@@ -3,7 +3,7 @@
 struct View {
     clip_from_world: mat4x4f,
     eye_m: vec3f,
-    // 0 colour, 1 normal, 2 depth, 3 wireframe
+    // 0 colour, 1 normal, 2 depth, 3 wireframe, 4 confidence, 5 views
     shading: u32,
     forward: vec3f,
     // 1 where the target encodes sRGB itself and wants linear light
@@ -14,7 +14,9 @@ struct View {
     // sRGB; a: device pixels per CSS pixel
     wire: vec4f,
     background: vec4f,
-    // far to near, sRGB
+    // sRGB; a: doublings of views along the ramp
+    unknown: vec4f,
+    // far to near or low to high, sRGB
     ramp: array<vec4f, 9>,
 }
 

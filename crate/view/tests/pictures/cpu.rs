@@ -48,8 +48,9 @@ fn known_places_have_the_colours_that_the_light_gives_them() {
 #[test]
 fn the_cpu_draws_what_the_gpu_draws() {
     let Some(gpu) = Gpu::open() else { return };
-    let arena = gpu.filled_arena(&room());
-    let mut painter = painter(&room());
+    let room = evident(room());
+    let arena = gpu.filled_arena(&room);
+    let mut painter = painter(&room);
     assert_eq!(painter.bounds(), arena.bounds());
     assert_eq!(painter.triangle_count(), arena.triangle_count());
     let outside = View::from(Vec3::new(7.0, -3.0, 5.0), Vec3::new(2.0, 1.5, 1.0));
@@ -60,6 +61,8 @@ fn the_cpu_draws_what_the_gpu_draws() {
             Shading::Normal,
             Shading::Depth,
             Shading::Wireframe,
+            Shading::Confidence,
+            Shading::Views,
         ] {
             for cull_back in [true, false] {
                 let mut view = view.clone();

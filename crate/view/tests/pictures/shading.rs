@@ -3,7 +3,7 @@
 use crate::support::*;
 use glam::{Affine3A, Mat3A, Vec3};
 use mesh::camera::Pinhole;
-use view::{CameraPose, DEPTH_RAMP, Shading, Theme};
+use view::{CameraPose, RAMP, Shading, Theme, UNKNOWN};
 
 /// Looks at the +X face of the cube, straight on, from 3 m.
 fn facing_red() -> View {
@@ -60,7 +60,7 @@ fn depth_runs_along_the_ramp_from_light_to_dark() {
     // The bricks' box is [-0.5, 1] wide along X (the +X face lies in the bricks beyond 0.5):
     // depths 2.0 to 3.5; the face at 2.5 is a third of the way, stop 5 + 1/3 from the far end.
     let mix = |i: usize| {
-        let (a, b) = (f32::from(DEPTH_RAMP[5][i]), f32::from(DEPTH_RAMP[6][i]));
+        let (a, b) = (f32::from(RAMP[5][i]), f32::from(RAMP[6][i]));
         (a + (b - a) / 3.0).round() as u8
     };
     assert_close(picture.at(MIDDLE), [mix(0), mix(1), mix(2)], 1);
@@ -74,6 +74,43 @@ fn depth_runs_along_the_ramp_from_light_to_dark() {
     let near = picture.at(room_view.pixel_of(Vec3::new(2.4, 1.7, 0.7)));
     let far = picture.at(room_view.pixel_of(Vec3::new(0.0, 0.3, 1.0)));
     assert!(lightness(near) > lightness(far) + 60, "{near:?} {far:?}");
+}
+
+#[test]
+fn evidence_runs_along_the_ramp_and_is_grey_where_unknown() {
+    let Some(gpu) = Gpu::open() else { return };
+    let arena = gpu.filled_arena(&evident(room()));
+    // On the floor from above: light falls on it as it does in the legend but for a few levels.
+    let mut view = View::from(Vec3::new(2.0, 1.4, 6.0), Vec3::new(2.0, 1.5, 0.0));
+    let nearest = |rgb: [u8; 3]| {
+        let off = |stop: &[u8; 3]| {
+            (0..3)
+                .map(|i| i32::from(stop[i].abs_diff(rgb[i])))
+                .sum::<i32>()
+        };
+        (0..RAMP.len())
+            .min_by_key(|&stop| off(&RAMP[stop]))
+            .unwrap()
+    };
+    for shading in [Shading::Confidence, Shading::Views] {
+        view.look.shading = shading;
+        let picture = gpu.picture(&arena, &view);
+        picture.save(&format!("room_{shading:?}"));
+        // Both grow from one end of the ramp to the other in 4 m: a stop is half a metre.
+        for (x, stop) in [(0.05, 0), (1.0, 2), (3.0, 6), (3.95, 8)] {
+            let found = picture.at(view.pixel_of(Vec3::new(x, 0.3, 0.0)));
+            assert_eq!(nearest(found), stop, "{shading:?} at {x} m: {found:?}");
+        }
+        let unknown = gpu.filled_arena(&cube());
+        let mut view = facing_red();
+        view.look.shading = shading;
+        let [r, g, b] = gpu.picture(&unknown, &view).at(MIDDLE);
+        assert!(
+            r == g && g == b && r.abs_diff(UNKNOWN[0]) < 10,
+            "{:?}",
+            [r, g, b]
+        );
+    }
 }
 
 #[test]

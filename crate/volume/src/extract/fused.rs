@@ -2,12 +2,13 @@
 //! the triangles. Between them only the bricks' triangle counts are read back, four bytes a brick.
 
 use super::{
-    BRICK_RECORD, SurfaceRule, VERTEX,
+    BRICK_RECORD, KEYS, LEVELS, MOST_VIEWS, SurfaceRule, VERTEX,
     table::{CASE_STRIDE, Table},
 };
 use crate::{
     VolumeError,
     compute::{float_buffer, float_tensor, int_buffer},
+    evidence::FRAME,
     field::{COLOR, Field, SAMPLE},
     lattice::BRICK_VOXELS,
 };
@@ -226,6 +227,19 @@ fn mix(a: f32, b: f32, t: f32) -> f32 {
     a + (b - a) * t
 }
 
+/// The evidence of the end of an edge that more frames measured, as [`mesh::soup::Evidence`] packs it.
+#[cube]
+fn evidence(a: f32, b: f32) -> f32 {
+    let most = a.max(b);
+    let frames = (most / FRAME).floor();
+    let sum = most - frames * FRAME;
+    let mut level = 0.0f32;
+    if sum > 0.0 {
+        level = (sum / frames * LEVELS + 1.5).floor();
+    }
+    frames.min(MOST_VIEWS) * 64.0 + level
+}
+
 /// Octahedral map of a direction to two integers of 12 bits, in one float.
 #[cube]
 fn pack_normal(x: f32, y: f32, z: f32) -> f32 {
@@ -355,6 +369,7 @@ fn emit_kernel(
         vertices[to + 2] = ((records[record + 2] * 8 + z) as f32 + t * ez as f32) * voxel_size_m;
         vertices[to + 3] = pack_normal(nx, ny, nz);
         vertices[to + 4] = packed;
-        vertices[to + 5] = ((x + 9 * (y + 9 * z)) * 3 + axis) as f32;
+        let evidence = evidence(samples[a * SAMPLE + 2], samples[b * SAMPLE + 2]);
+        vertices[to + 5] = evidence * KEYS + ((x + 9 * (y + 9 * z)) * 3 + axis) as f32;
     }
 }

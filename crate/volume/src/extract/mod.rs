@@ -22,6 +22,12 @@ use table::Table;
 /// Numbers of a vertex, in the layout of [`mesh::soup`].
 pub(crate) const VERTEX: usize = mesh::soup::VERTEX_FLOATS;
 
+/// [`mesh::soup::KEYS`] and [`mesh::soup::Evidence`]'s limits, as the kernels count.
+const KEYS: f32 = mesh::soup::KEYS as f32;
+const MOST_VIEWS: f32 = mesh::soup::Evidence::MOST_VIEWS as f32;
+/// Steps of confidence in the field's unit.
+const LEVELS: f32 = mesh::soup::Evidence::STEPS as f32 / crate::evidence::SURE;
+
 /// Integers that describe one brick to the kernels: x, y, z of the brick, its first triangle, then the slots of the
 /// 27 bricks around it (x fastest), and one to fill up.
 const BRICK_RECORD: usize = 32;

@@ -4,11 +4,12 @@
 //! the cells' upper corners, and one on either side for the slopes).
 
 use super::{
-    BRICK_RECORD, SurfaceRule, VERTEX,
+    BRICK_RECORD, KEYS, LEVELS, MOST_VIEWS, SurfaceRule, VERTEX,
     table::{CASE_STRIDE, MAX_TRIANGLES, Table},
 };
 use crate::{
     VolumeError,
+    evidence::FRAME,
     field::{COLOR, Field, SAMPLE},
     lattice::BRICK_VOXELS,
 };
@@ -47,6 +48,7 @@ pub(super) async fn extract(
 struct Block {
     distance: Tensor<1>,
     weight: Tensor<1>,
+    evidence: Tensor<1>,
     colors: Option<Tensor<2>>,
     device: Device,
 }
@@ -76,7 +78,8 @@ impl Block {
         });
         Self {
             distance: samples.clone().narrow(1, 0, 1).squeeze_dim(1),
-            weight: samples.narrow(1, 1, 1).squeeze_dim(1),
+            weight: samples.clone().narrow(1, 1, 1).squeeze_dim(1),
+            evidence: samples.narrow(1, 2, 1).squeeze_dim(1),
             colors,
             device,
         }
@@ -201,9 +204,11 @@ impl Block {
             mix(at_a, at_b, &t)
         });
         columns.push(pack_normal(normal));
+        let evidence = self.packed_evidence(a.clone(), b.clone());
         columns.push(self.packed_colors(a, b, &t));
         let [x, y, z] = place;
-        columns.push((((z * 9 + y) * 9 + x) * 3 + axis).float());
+        let key = (((z * 9 + y) * 9 + x) * 3 + axis).float();
+        columns.push(evidence * KEYS + key);
         let columns = columns.into_iter().map(|c| c.unsqueeze_dim(1)).collect();
         Tensor::cat(columns, 1)
     }
@@ -222,6 +227,17 @@ impl Block {
             steps = steps + seen;
         }
         slope / steps.clamp_min(1.0)
+    }
+
+    /// Of the end of the edge that more frames measured.
+    fn packed_evidence(&self, a: Tensor<1, Int>, b: Tensor<1, Int>) -> Tensor<1> {
+        let a = self.evidence.clone().select(0, a);
+        let most = a.max_pair(self.evidence.clone().select(0, b));
+        let frames = (most.clone() / FRAME).floor();
+        let sum = most - frames.clone() * FRAME;
+        let unsure = sum.clone().lower_equal_elem(0.0);
+        let level = (sum / frames.clone().clamp_min(1.0) * LEVELS + 1.5).floor();
+        frames.clamp_max(MOST_VIEWS) * 64.0 + level.mask_fill(unsure, 0.0)
     }
 
     fn packed_colors(&self, a: Tensor<1, Int>, b: Tensor<1, Int>, t: &Tensor<1>) -> Tensor<1> {

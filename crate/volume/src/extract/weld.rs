@@ -26,7 +26,7 @@ impl Welder {
     }
 
     fn vertex(&mut self, brick: Brick, vertex: &[f32]) -> u32 {
-        let key = vertex[VERTEX - 1] as i32;
+        let key = vertex[VERTEX - 1] as i32 % soup::KEYS as i32;
         let (axis, place) = (key % 3, key / 3);
         let place = IVec3::new(place % 9, place / 9 % 9, place / 81);
         let mesh = &mut self.mesh;

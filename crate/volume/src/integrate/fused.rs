@@ -4,6 +4,7 @@ use super::{BRICK_RECORD, Camera, Images, NEAR_M};
 use crate::{
     VolumeError,
     compute::{float_buffer, float_tensor, int_buffer},
+    evidence::{FRAME, FULL, SURE},
     field::{COLOR, Field, SAMPLE},
     lattice::BRICK_VOXELS,
 };
@@ -127,6 +128,13 @@ fn integrate_kernel(
                 }
                 if comptime!(has_confidence) {
                     weight *= confidence[at as usize - 1];
+                }
+                if sdf <= truncation_m && samples[voxel * SAMPLE + 2] < FULL {
+                    let mut frame = f32::new(FRAME);
+                    if comptime!(has_confidence) {
+                        frame += (confidence[at as usize - 1] * SURE).ceil();
+                    }
+                    samples[voxel * SAMPLE + 2] += frame;
                 }
                 let sum = samples[voxel * SAMPLE + 1] + weight;
                 let mean = samples[voxel * SAMPLE];

@@ -5,7 +5,8 @@
 //! `d = D(u, v)`: `sdf = d - z`. Skipped where `p` is outside the image, nothing was measured, `d` is beyond the maximum
 //! depth or `sdf < -truncation`. Otherwise with `s = min(1, sdf / truncation)` and weight `w`, 1 or
 //! `1 / max(z, 0.5 m)^2`, times the pixel's confidence where the image has one:
-//! `S <- (S W + s w) / (W + w)`, `W <- W + w`; colour likewise, with a weight of its own, where `|sdf| <= truncation`.
+//! `S <- (S W + s w) / (W + w)`, `W <- W + w`; colour likewise, with a weight of its own, where `|sdf| <= truncation`. There
+//! the frame counts as evidence, too, with its confidence ([`crate::evidence`]).
 
 mod fused;
 mod plain;

@@ -2,7 +2,8 @@
 
 use super::{BRICK_RECORD, Camera, Images, NEAR_M};
 use crate::{
-    field::{COLOR, Field, SAMPLE},
+    evidence::{FRAME, FULL, SURE},
+    field::Field,
     lattice::BRICK_VOXELS,
 };
 use burn::{
@@ -42,24 +43,29 @@ fn integrate_batch(field: &mut Field, records: &[i32], camera: &Camera, images: 
     } else {
         z.ones_like()
     };
+    let mut frame = z.full_like(FRAME);
     if let Some(confidence) = &images.confidence {
-        weight = weight * confidence.clone().gather(0, at);
+        let confidence = confidence.clone().gather(0, at);
+        frame = frame + (confidence.clone() * SURE).ceil();
+        weight = weight * confidence;
     }
-    let step = weight.clone() * seen.clone().float();
-    average(&mut field.samples, &slots, SAMPLE, step, &[s]);
+    let near = seen
+        .clone()
+        .bool_and(sdf.lower_equal_elem(rule.truncation_m));
+    let step = weight.clone() * seen.float();
+    let frame = frame * near.clone().float();
+    average(&mut field.samples, &slots, step, &[s], Some(frame));
 
     if let (Some(image), Some(color_camera)) = (&images.color, camera.color) {
         let (at, inside) = pixels(&color_camera, &x, &y, &z);
-        let near = seen
-            .bool_and(inside)
-            .bool_and(sdf.lower_equal_elem(rule.truncation_m));
+        let near = near.bool_and(inside);
         let packed = image.clone().gather(0, at);
         let red = (packed.clone() / 65536.0).floor();
         let rest = packed - red.clone() * 65536.0;
         let green = (rest.clone() / 256.0).floor();
         let blue = rest - green.clone() * 256.0;
         let step = weight * near.float();
-        average(&mut field.colors, &slots, COLOR, step, &[red, green, blue]);
+        average(&mut field.colors, &slots, step, &[red, green, blue], None);
     }
 }
 
@@ -108,20 +114,21 @@ fn pixels(
     (index, inside)
 }
 
-/// One step of the running average at the rows `slots` of `stored`, whose last channel is the sum of weights. `step` is the
-/// weight of the new values, 0 where there are none.
+/// One step of the running average at the rows `slots` of `stored`: channels for the values, one for the sum of weights, and
+/// one for evidence, if a `frame`'s is added. `step` is the weight of the new values, 0 where there are none.
 fn average(
     stored: &mut Tensor<2>,
     slots: &Tensor<1, Int>,
-    channels: usize,
     step: Tensor<1>,
     values: &[Tensor<1>],
+    frame: Option<Tensor<1>>,
 ) {
+    let channels = values.len() + 1 + usize::from(frame.is_some());
     let bricks = slots.dims()[0];
     let device = stored.device();
     let old = stored.clone().select(0, slots.clone());
     let old = old.reshape([bricks * BRICK_VOXELS, channels]);
-    let weight = old.clone().narrow(1, channels - 1, 1).squeeze_dim::<1>(1);
+    let weight = old.clone().narrow(1, values.len(), 1).squeeze_dim::<1>(1);
     // Where nothing was ever seen the share is 0 / tiny.
     let share = step.clone() / (weight + step.clone()).clamp_min(f32::MIN_POSITIVE);
     let mut changes: Vec<Tensor<2>> = Vec::with_capacity(channels);
@@ -130,6 +137,11 @@ fn average(
         changes.push(((value.clone() - old) * share.clone()).unsqueeze_dim(1));
     }
     changes.push(step.unsqueeze_dim(1));
+    if let Some(frame) = frame {
+        let known = old.narrow(1, values.len() + 1, 1);
+        let full = known.lower_elem(FULL).float();
+        changes.push(frame.unsqueeze_dim(1) * full);
+    }
     let changes = Tensor::cat(changes, 1).reshape([bricks, BRICK_VOXELS * channels]);
     let whole = std::mem::replace(stored, Tensor::empty([1, 1], &device));
     *stored = whole.select_assign(0, slots.clone(), changes, IndexingUpdateOp::Add);

@@ -1,14 +1,14 @@
-//! Attention in loops for the processor: a segment's rows lie together and stay in the nearest cache. The scores of one
-//! row at a time are held, never those of all.
+//! Attention in loops for the processor: a segment's rows lie together and stay in the nearest cache. On the way back the
+//! scores of one row at a time are held, never those of all.
 
 use burn::backend::{Flex, tensor::FloatTensor};
 use rayon::prelude::*;
 
 use super::super::flex::{parts, split_rows, tensor};
-use super::super::functions::{exp, ln};
-use super::super::lanes::{LANES, add_scaled, dot, each, sum};
+use super::super::functions::exp;
+use super::super::lanes::{LANES, add_scaled, dot, each};
 use super::super::wide::wide;
-use super::{AttentionPasses, Shared};
+use super::{AttentionPasses, Shared, forward};
 
 /// Rows that a thread takes at a time.
 const ROWS: usize = 512;
@@ -35,14 +35,22 @@ impl<'a> Table<'a> {
             ..self
         }
     }
+
+    /// Channels of a head.
+    #[inline(always)]
+    pub fn width(&self) -> usize {
+        self.channels / self.heads
+    }
 }
 
-/// Room for one segment's scores and packed keys and values.
+/// Room for one segment's scores and what is packed for them.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
-    keys: Vec<f32>,
-    values: Vec<f32>,
-    scores: Vec<f32>,
+    /// Packed keys, or queries.
+    pub(super) keys: Vec<f32>,
+    /// Packed values, or sums of them.
+    pub(super) values: Vec<f32>,
+    pub(super) scores: Vec<f32>,
     gains: Vec<f32>,
 }
 
@@ -137,28 +145,21 @@ impl AttentionPasses for Flex {
     }
 }
 
-wide! {
-    /// The segments between `offsets`; `table`, `out` and `log_sum` begin with the first of them.
-    pub(crate) fn forward(table: Table<'_>, offsets: &[i32], scratch: &mut Scratch, out: &mut [f32], log_sum: &mut [f32]) {
-        let Some(start) = offsets.first().map(|o| *o as usize) else { return };
-        let (channels, heads) = (table.channels, table.heads);
-        for bounds in offsets.windows(2) {
-            let [first, end] = [bounds[0] as usize, bounds[1] as usize];
-            if first == end {
-                continue;
-            }
-            let out = &mut out[(first - start) * channels..(end - start) * channels];
-            let log_sum = &mut log_sum[(first - start) * heads..(end - start) * heads];
-            let table = table.starting_at(first - start);
-            match channels / heads {
-                8 => segment_forward::<8>(table, end - first, scratch, out, log_sum),
-                12 => segment_forward::<12>(table, end - first, scratch, out, log_sum),
-                20 => segment_forward::<20>(table, end - first, scratch, out, log_sum),
-                40 => segment_forward::<40>(table, end - first, scratch, out, log_sum),
-                _ => segment_forward::<0>(table, end - first, scratch, out, log_sum),
-            }
-        }
-    }
+/// Attention in the segments between `offsets`; `table`, `out` and `log_sum` begin with the first of them.
+pub(crate) fn forward(
+    table: Table<'_>,
+    offsets: &[i32],
+    scratch: &mut Scratch,
+    out: &mut [f32],
+    log_sum: &mut [f32],
+) {
+    forward::run(forward::Segments {
+        table,
+        offsets,
+        scratch,
+        out,
+        log_sum,
+    });
 }
 
 wide! {
@@ -206,27 +207,6 @@ fn pack(table: &[f32], stride: usize, rows: usize, width: usize, packed: &mut Ve
     }
 }
 
-/// The largest of whole groups of eight.
-#[inline(always)]
-fn largest(scores: &[f32]) -> f32 {
-    let mut lanes = [f32::NEG_INFINITY; LANES];
-    for scores in scores.chunks_exact(LANES) {
-        for lane in 0..LANES {
-            lanes[lane] = if scores[lane] > lanes[lane] {
-                scores[lane]
-            } else {
-                lanes[lane]
-            };
-        }
-    }
-    let larger = |a: f32, b: f32| if a > b { a } else { b };
-    let [a, b, c, d, e, f, g, h] = lanes;
-    larger(
-        larger(larger(a, b), larger(c, d)),
-        larger(larger(e, f), larger(g, h)),
-    )
-}
-
 /// Scalar products of `row` with the packed rows.
 #[inline(always)]
 fn products(row: &[f32], packed: &[f32], out: &mut [f32]) {
@@ -261,39 +241,6 @@ fn mix<const W: usize>(by: f32, weights: &[f32], table: &[f32], stride: usize, o
     }
     for (out, sum) in out.iter_mut().zip(sums) {
         *out = by * sum;
-    }
-}
-
-#[inline(always)]
-fn segment_forward<const W: usize>(
-    table: Table<'_>,
-    rows: usize,
-    scratch: &mut Scratch,
-    out: &mut [f32],
-    log_sum: &mut [f32],
-) {
-    let (channels, heads) = (table.channels, table.heads);
-    let width = if W == 0 { channels / heads } else { W };
-    let scale = 1.0 / (width as f32).sqrt();
-    for head in 0..heads {
-        let [query, key, value] = table.parts.map(|part| &part[head * width..]);
-        pack(key, table.stride, rows, width, &mut scratch.keys);
-        scratch.scores.resize(rows.div_ceil(LANES) * LANES, 0.0);
-        for i in 0..rows {
-            products(
-                &query[i * table.stride..][..width],
-                &scratch.keys,
-                &mut scratch.scores,
-            );
-            let scores = &mut scratch.scores;
-            scores[rows..].fill(f32::NEG_INFINITY);
-            let most = largest(scores);
-            each(scores, [], |score, []| exp(scale * (score - most)));
-            let sum = sum(scores);
-            let out = &mut out[i * channels + head * width..][..width];
-            mix::<W>(1.0 / sum, &scores[..rows], value, table.stride, out);
-            log_sum[i * heads + head] = scale * most + ln(sum);
-        }
     }
 }
 

@@ -1,8 +1,8 @@
 //! On the processor: for a block of output rows and a tap, the pairs that are there, and one product over them. Nothing is
 //! gathered in memory and absent neighbours cost nothing.
 
-use super::register::Plain;
 use super::tile::{Products, ROWS, Rows};
+use crate::ops::register::on_best_register;
 use rayon::prelude::*;
 
 /// Output rows of a block: their sums stay in the second-level cache.
@@ -177,41 +177,5 @@ pub(super) fn weight_gradient(
     output
 }
 
-macro_rules! on_best_register {
-    ($name:ident, $work:ident) => {
-        fn $name(work: $work) {
-            #[cfg(target_arch = "x86_64")]
-            {
-                use super::register::x86::{Avx2, Avx512};
-
-                #[target_feature(enable = "avx512f")]
-                fn avx512(work: $work) {
-                    // SAFETY: the caller asked for it.
-                    unsafe { work.run::<Avx512>() }
-                }
-
-                #[target_feature(enable = "avx2,fma")]
-                fn avx2(work: $work) {
-                    // SAFETY: the caller asked for it.
-                    unsafe { work.run::<Avx2>() }
-                }
-
-                if std::arch::is_x86_feature_detected!("avx512f") {
-                    // SAFETY: the processor was asked just now.
-                    return unsafe { avx512(work) };
-                }
-                if std::arch::is_x86_feature_detected!("avx2")
-                    && std::arch::is_x86_feature_detected!("fma")
-                {
-                    // SAFETY: the processor was asked just now.
-                    return unsafe { avx2(work) };
-                }
-            }
-            // SAFETY: it needs no instructions of its own.
-            unsafe { work.run::<Plain>() }
-        }
-    };
-}
-
-on_best_register!(on_rows, Rows);
-on_best_register!(on_products, Products);
+on_best_register!(fn on_rows(Rows));
+on_best_register!(fn on_products(Products));

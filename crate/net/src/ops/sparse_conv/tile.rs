@@ -1,6 +1,6 @@
 //! The inner loops: a few rows by a few registers of columns, held in registers while a sum runs.
 
-use super::register::Register;
+use crate::ops::register::Register;
 
 /// Rows of a tile.
 pub(super) const ROWS: usize = 8;
@@ -216,10 +216,10 @@ impl Products<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::register::Plain;
-    #[cfg(target_arch = "x86_64")]
-    use super::super::register::x86;
     use super::*;
+    use crate::ops::register::Plain;
+    #[cfg(target_arch = "x86_64")]
+    use crate::ops::register::x86;
 
     /// Both kinds of work by one register against sums one by one, which are exact: all numbers are small and whole.
     fn check<W: Register>() {

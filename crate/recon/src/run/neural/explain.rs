@@ -47,7 +47,7 @@ pub(super) fn alone(scan: &Scan, keyframes: &[usize], tiling: &Tiling) -> Option
 /// A fault of the levels.
 pub(super) fn fault(fault: Fault, scan: &Scan, keyframes: &[usize]) -> RunError {
     match fault {
-        Fault::Device(text) => RunError::Volume(volume::VolumeError::Device(text)),
+        Fault::Run(error) => error,
         Fault::Nothing { level, sites } => RunError::NothingOccupied {
             sites,
             voxel_cm: (level.voxel_size_m() * 100.0).round() as u32,

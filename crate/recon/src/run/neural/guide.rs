@@ -1,5 +1,6 @@
 //! Stereo's depth for networks that were trained with it as a guide.
 
+use super::kept;
 use crate::{
     convert::{pinhole, pose},
     event::{Flow, Sink, Stage},
@@ -27,8 +28,28 @@ fn without(least_m: f64, keyframes: usize) -> Finding {
     }
 }
 
-/// Depth with confidence of every keyframe that stereo can give some. `None` if the sink stopped it.
+/// Depth with confidence of every keyframe that stereo can give some, made now or kept of an earlier run. `None` if the sink
+/// stopped it.
 pub(super) async fn maps(
+    scan: &Scan,
+    keyframes: &[usize],
+    device: &Device,
+    sink: &mut impl Sink,
+) -> Result<Option<Vec<GuideMap>>, RunError> {
+    let before = sink.kept(Stage::Matching);
+    if let Some(maps) = before.and_then(|bytes| kept::read_guide(&bytes)) {
+        return Ok(Some(maps));
+    }
+    let maps = matched(scan, keyframes, device, sink).await?;
+    if let Some(maps) = &maps
+        && sink.keeps()
+    {
+        sink.keep(Stage::Matching, kept::guide(maps));
+    }
+    Ok(maps)
+}
+
+async fn matched(
     scan: &Scan,
     keyframes: &[usize],
     device: &Device,

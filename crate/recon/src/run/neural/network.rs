@@ -1,7 +1,9 @@
 //! What the driver asks of a network: [`Ipdrecon`] is one. Tests put another here that knows the truth.
 
+use super::evidence::Seen;
 use burn::{
     Tensor,
+    module::Module,
     tensor::{Device, Int},
 };
 use glam::{IVec3, Vec3};
@@ -17,8 +19,15 @@ pub trait Network {
     /// What is kept of pictures at one level.
     type Plane;
 
+    /// Where its tensors are, and where its guide is made. It may be another device than the volume's: a processor that plays GPU
+    /// is no match for itself.
+    fn device(&self) -> Device;
+
     /// Whether it wants stereo's depth as a guide.
     fn guided(&self) -> bool;
+
+    /// Bytes of a voxel in the widest tensor at a level.
+    fn row_bytes(&self, level: Level) -> usize;
 
     /// Feature planes of pictures `[V, 3, H, W]`, sRGB 0 to 255, from coarse to fine.
     fn planes(&self, images: Tensor<4>, views: &[View]) -> [Self::Plane; 3];
@@ -26,7 +35,8 @@ pub trait Network {
     /// Planes of several pictures as one, in that order; there is at least one.
     fn stack(&self, planes: &[&Self::Plane]) -> Self::Plane;
 
-    /// What `views`, whose planes these are, say together of each site: `[N, C]`.
+    /// What `views`, whose planes these are, say together of each site: `[N, C]`; at the fine level also what that rests on, if
+    /// the network can tell.
     fn fuse(
         &self,
         level: Level,
@@ -34,7 +44,7 @@ pub trait Network {
         views: &[View],
         sites: &[IVec3],
         origin_m: Vec3,
-    ) -> Tensor<2>;
+    ) -> (Tensor<2>, Option<Seen>);
 
     /// The 3D network, over all sites of the scan at once.
     fn decode(&self, level: Level, input: Input<'_>) -> Decoded;
@@ -57,8 +67,17 @@ pub struct Input<'a> {
 impl Network for Ipdrecon {
     type Plane = Plane;
 
+    fn device(&self) -> Device {
+        let first = self.devices().into_iter().next();
+        first.unwrap_or_else(Device::flex)
+    }
+
     fn guided(&self) -> bool {
         self.config().guide
+    }
+
+    fn row_bytes(&self, level: Level) -> usize {
+        self.config().row_bytes(level)
     }
 
     fn planes(&self, images: Tensor<4>, views: &[View]) -> [Plane; 3] {
@@ -85,15 +104,17 @@ impl Network for Ipdrecon {
         views: &[View],
         sites: &[IVec3],
         origin_m: Vec3,
-    ) -> Tensor<2> {
+    ) -> (Tensor<2>, Option<Seen>) {
         let size = views.first().map(|view| view.camera);
         let size = size.map_or([0, 0], |camera| {
             plane_size(camera.width as usize, camera.height as usize, level)
         });
         let (voxel_m, stride) = (level.voxel_size_m(), level.stride());
         let pairs = Pairs::find(sites, voxel_m, origin_m, views, size, stride);
-        let pairs = pairs.on(&plane.base.device());
-        Self::fuse(self, level, plane, &pairs, Pooling::Softmax).features
+        let tensors = pairs.on(&plane.base.device());
+        let seen = (level == Level::Fine).then(|| Seen::new(plane, &pairs, &tensors));
+        let fused = Self::fuse(self, level, plane, &tensors, Pooling::Softmax);
+        (fused.features, seen)
     }
 
     fn decode(&self, level: Level, input: Input<'_>) -> Decoded {

@@ -1,0 +1,112 @@
+//! Where the engine works: on the adapter that the browser offers, or on the processor.
+
+use crate::{
+    messages::{DeviceChoice, Event},
+    stage::Gpu,
+};
+use burn::tensor::{Device, wgpu::WgpuSetup};
+use js_sys::Function;
+use recon::Limits;
+use tsify::Tsify;
+use wasm_bindgen::JsValue;
+
+/// The largest binding that is used even where more is allowed.
+const BINDING_BYTES: u64 = 1 << 30;
+/// The device takes this many of burn's tasks at a time: small submits keep the page's frames coming.
+const TASKS_A_SUBMIT: usize = 16;
+/// Names of adapters that are the processor in disguise.
+const SOFTWARE: [&str; 3] = ["swiftshader", "llvmpipe", "lavapipe"];
+
+/// What was found.
+pub struct Found {
+    pub device: Device,
+    /// Where the network works: a processor that plays GPU is slower at that than the processor itself.
+    pub network_device: Device,
+    pub limits: Limits,
+    /// To draw with; without it the processor draws.
+    pub gpu: Option<Gpu>,
+    /// What the page is told.
+    pub ready: Event,
+}
+
+impl Found {
+    /// The device of this choice, or the processor. `emit` is told if the device is lost later.
+    pub async fn of(choice: DeviceChoice, emit: &Function) -> Self {
+        let asked = "The processor does the work, as was asked for";
+        if choice == DeviceChoice::Cpu {
+            return Self::processor("", asked);
+        }
+        let options = Device::wgpu_options().tasks_max(TASKS_A_SUBMIT);
+        match options.init_with_setup_async().await {
+            Ok((device, setup)) => {
+                tell_loss(&setup.device, emit.clone());
+                Self::adapter(device, setup, choice)
+            }
+            // The error's words are for the report; the visitor is told what it means.
+            Err(error) => Self::processor(
+                &format!("; {error}"),
+                "This browser offers no WebGPU: the processor does the work, which takes longer",
+            ),
+        }
+    }
+
+    fn processor(why: &str, note: &str) -> Self {
+        Self {
+            device: Device::flex(),
+            network_device: Device::flex(),
+            limits: Limits::default(),
+            gpu: None,
+            ready: Event::Ready {
+                device: "cpu".to_owned(),
+                adapter: format!("burn flex, one thread{why}"),
+                note: Some(note.to_owned()),
+            },
+        }
+    }
+
+    fn adapter(device: Device, setup: WgpuSetup, choice: DeviceChoice) -> Self {
+        let info = setup.adapter.get_info();
+        let words = format!("{} {}", info.name, info.driver);
+        let lower = words.to_lowercase();
+        let is_software = SOFTWARE.iter().any(|name| lower.contains(name))
+            || info.device_type == wgpu::DeviceType::Cpu;
+        let binding_bytes = setup.device.limits().max_storage_buffer_binding_size;
+        let apart = is_software && choice == DeviceChoice::Auto;
+        Self {
+            network_device: match apart {
+                true => Device::flex(),
+                false => device.clone(),
+            },
+            device,
+            limits: Limits {
+                binding_bytes: binding_bytes.min(BINDING_BYTES) as usize,
+                network_is_bound: !apart,
+            },
+            gpu: Some(Gpu {
+                instance: setup.instance,
+                adapter: setup.adapter,
+                device: setup.device,
+                queue: setup.queue,
+                is_software,
+            }),
+            ready: Event::Ready {
+                device: "webgpu".to_owned(),
+                adapter: words.trim().to_owned(),
+                note: None,
+            },
+        }
+    }
+}
+
+fn tell_loss(device: &wgpu::Device, emit: Function) {
+    device.set_device_lost_callback(move |reason, message| {
+        let event = Event::Failed {
+            code: "device".to_owned(),
+            message: format!("The graphics device was lost ({reason:?}: {message})"),
+            advice: "Start again, with larger voxels if it happens again.".to_owned(),
+        };
+        if let Ok(event) = event.into_js() {
+            let _ = emit.call1(&JsValue::NULL, &event);
+        }
+    });
+}
