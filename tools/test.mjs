@@ -3,7 +3,7 @@
 import { join } from 'node:path';
 import { run, seconds, toolsDir, write } from './run.mjs';
 import { setup } from './setup.mjs';
-import { count, failures, reasons, sum } from './test/count.mjs';
+import { afterSecondTry, count, failures, reasons, sum } from './test/count.mjs';
 import { lanes } from './test/lanes.mjs';
 
 const limitSeconds = 2400;
@@ -15,27 +15,35 @@ if (unknown.length > 0) {
   process.exit(2);
 }
 
+/** Runs a command of a lane once. */
+async function attempt({ program, env, count: kind }, args) {
+  const result = await run(program, args, { env, limitSeconds, show: verbose });
+  const note = result.timedOut ? `\nended after ${limitSeconds} s\n` : '';
+  const counted = count(kind, result);
+  if (counted.failed > 0 && !verbose) console.log(failures(result.output));
+  return { counted, output: `$ ${[program, ...args].join(' ')}\n${result.output}${note}` };
+}
+
+/** Runs a command of a lane; what failed is run a second time, where the command can name it. */
+async function proof(name, command) {
+  if (command.skip) return { counted: { passed: 0, failed: 0, skipped: 1 }, output: `skipped: ${command.skip}\n` };
+  const first = await attempt(command, command.args);
+  const again = first.counted.failed > 0 ? command.again?.(first.output) : undefined;
+  if (!again) return first;
+  console.log(`lane    ${name}: ${words(first.counted)}; what failed is run a second time …`);
+  const second = await attempt(command, again);
+  return { counted: afterSecondTry(first.counted, second.counted), output: first.output + second.output };
+}
+
 /** Runs one lane to its end, also past a failure, and gives its count. */
 async function lane(name) {
   const start = performance.now();
   console.log(`lane    ${name} …`);
-  const counts = [];
-  let output = '';
-  for (const { skip, program, args, env, count: kind } of await lanes[name]()) {
-    if (skip) {
-      output += `skipped: ${skip}\n`;
-      counts.push({ passed: 0, failed: 0, skipped: 1 });
-      continue;
-    }
-    const result = await run(program, args, { env, limitSeconds, show: verbose });
-    const note = result.timedOut ? `\nended after ${limitSeconds} s\n` : '';
-    output += `$ ${[program, ...args].join(' ')}\n${result.output}${note}`;
-    counts.push(count(kind, result));
-  }
-  const total = sum(counts);
-  const log = join(toolsDir, 'log', `${name}.log`);
-  write(log, output);
-  if (total.failed > 0 && !verbose) console.log(failures(output));
+  const proofs = [];
+  for (const command of await lanes[name]()) proofs.push(await proof(name, command));
+  const total = sum(proofs.map(({ counted }) => counted));
+  const output = proofs.map(({ output }) => output).join('');
+  write(join(toolsDir, 'log', `${name}.log`), output);
   for (const reason of reasons(output)) console.log(`        ${reason}`);
   console.log(`lane    ${name}: ${total.failed > 0 ? 'FAILED' : 'ok'}, ${words(total)} (${seconds(start)})`);
   return { name, total };

@@ -81,6 +81,7 @@ test('an engine that crashes is told once, and the next scan gets a new one', as
   const trap = `export default async () => {};
     export class Engine {
       static async start(_canvas, _request, emit) { emit({ type: "ready", device: "cpu", adapter: "none" }); return new Engine(); }
+      computes = true;
       handle({ type }) {
         if (type !== "openSample") return;
         setTimeout(() => { throw new WebAssembly.RuntimeError("unreachable"); });

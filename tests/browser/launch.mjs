@@ -24,10 +24,10 @@ function record(types) {
 }
 
 /**
- * A site and a browser for the tests of one file.
- * @param {{ webgpu?: boolean }} [options]
+ * A site and a browser for the tests of one file. `device: 'gpu'` has its pages compute on WebGPU even where that is software, and would draw alone.
+ * @param {{ webgpu?: boolean, device?: 'auto' | 'gpu' | 'cpu' }} [options]
  */
-export async function visit(options) {
+export async function visit({ device = 'auto', ...options } = {}) {
   const site = await serve(join(root, 'www/dist'), 0);
   const browser = await launch(options);
   return {
@@ -40,7 +40,9 @@ export async function visit(options) {
       page.on('pageerror', (error) => errors.push(error.message));
       await page.addInitScript(record, events);
       await before?.(page);
-      await page.goto(site.url + path);
+      const address = new URL(path, site.url);
+      if (device !== 'auto' && !address.searchParams.has('device')) address.searchParams.set('device', device);
+      await page.goto(address.href);
       return new Visitor(page, errors);
     },
     async close() {

@@ -29,7 +29,7 @@ test('1,000 frames leave the engine as small as 500 did', async (t) => {
     return;
   }
   const folder = mkdtempSync(join(tmpdir(), 'ipdrecon-'));
-  const browser = await visit();
+  const browser = await visit({ device: 'gpu' });
   t.after(async () => {
     await browser.close();
     rmSync(folder, { recursive: true });

@@ -101,11 +101,11 @@ test('the network and its guide on WebGPU itself, even where that is software, m
   assert.ok(Math.abs(f[0] - f[1]) <= 0.02, `F ${f}`);
 });
 
-/** A page with the photos of the sample room, planned; what it asks of the site on the way is counted. */
-async function planned(options = {}) {
+/** A page with the photos of the sample room, or others, planned; what it asks of the site on the way is counted. */
+async function planned({ scan = photos, ...options } = {}) {
   const visitor = await browser.open({ path: '?autostart=0&device=cpu', ...options });
   await visitor.until('idle');
-  await visitor.drop(photos);
+  await visitor.drop(scan);
   await visitor.until('planned');
   return visitor;
 }
@@ -122,7 +122,7 @@ test('the network is fetched once: a second visit downloads nothing', async () =
   const { page } = visitor;
   const plan = async () => (await visitor.events('planned')).at(-1).plan;
   assert.equal((await plan()).downloadBytes, readFileSync(released).length, 'told before it is fetched');
-  assert.match(await page.locator('#plan').innerText(), /Download\s+5 MB of weights, once\s+Expected time\s+about .*No WebGPU: the processor does the work, with 160 × 120, 20 views, in about \d/s);
+  assert.match(await page.locator('#plan').innerText(), /Download\s+5 MB of weights, once\s+Expected time\s+about .*The processor does the work, with 160 × 120, 20 views, in about \d/s);
   const first = await run(visitor);
   assert.ok(first.finished?.triangles > 0, JSON.stringify(first));
   const progress = (await visitor.events('progress')).filter(({ total }) => total > 1e6);
@@ -157,14 +157,10 @@ test('how sure the network is and how many views there were are pictures of thei
   await visitor.close();
 });
 
-/** Whether the adapter is the processor in disguise, or there is none: the network then works on the thread that draws. */
-const isSoftware = (page) => page.evaluate(async () => {
-  const { vendor, architecture, description } = (await navigator.gpu?.requestAdapter())?.info ?? {};
-  return !vendor || /swiftshader|llvmpipe|lavapipe/i.test(`${architecture} ${description}`);
-});
-
 test('the view answers the hand while the network works', async (t) => {
-  const visitor = await planned({ path: '?autostart=0' });
+  const real = join(root, '../shared/scans/hololens/scan');
+  const scan = existsSync(real) ? withoutDepth(real, join(out, 'hololens-dragged')) : photos;
+  const visitor = await planned({ path: '?autostart=0', scan });
   const { page } = visitor;
   const [worker] = page.workers();
   // The viewer's own frames: when each was drawn, in the worker.
@@ -198,19 +194,14 @@ test('the view answers the hand while the network works', async (t) => {
   const ended = run(visitor, 12);
   await visitor.event('bricks', 120_000);
   await visitor.page.evaluate(() => { window.record.longTasks = []; });
-  const busy = await drag(120_000, 'running');
+  const busy = await drag(240_000, 'running');
   assert.ok((await ended).finished?.triangles > 0);
   await visitor.isSmooth();
   await page.waitForTimeout(1000);
   const idle = await drag(6000, 'finished');
   const words = ({ median, p95, longest }) => `median ${median.toFixed(0)}, 95 % ${p95.toFixed(0)}, longest ${longest.toFixed(0)} ms`;
   t.diagnostic(`from frame to frame under the hand: ${words(busy)} while the network works, ${words(idle)} when it is done`);
-  if (await isSoftware(page)) {
-    console.log('skipped in part: 95 % of frames within 3 times the idle value; without a real GPU a step of the network holds the thread that draws');
-    assert.ok(busy.median <= 3 * idle.median, 'half of the frames come as fast as ever');
-  } else {
-    assert.ok(busy.p95 <= 3 * idle.p95, '95 % of the frames come as fast as ever');
-  }
+  assert.ok(busy.p95 <= 3 * idle.p95, '95 % of the frames come as fast as ever');
   await visitor.close();
 });
 

@@ -8,7 +8,7 @@ import { pictures, visit } from './launch.mjs';
 
 let browser;
 before(async () => {
-  browser = await visit();
+  browser = await visit({ device: 'gpu' });
 });
 after(() => browser.close());
 

@@ -12,7 +12,7 @@ import { pictures, visit } from './launch.mjs';
 const out = mkdtempSync(join(tmpdir(), 'ipdrecon-'));
 let browser;
 before(async () => {
-  browser = await visit();
+  browser = await visit({ device: 'gpu' });
   await build();
 });
 after(async () => {

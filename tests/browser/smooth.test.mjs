@@ -30,8 +30,8 @@ async function withoutLongTasks(journey) {
   assert.deepEqual(tasks, [], 'long tasks, three times');
 }
 
-test('no long task from the click on the sample to the exported file', () => withoutLongTasks(async () => {
-  const visitor = await browser.open();
+for (const device of ['gpu', 'auto']) test(`no long task from the click on the sample to the exported file; device ${device}`, () => withoutLongTasks(async () => {
+  const visitor = await browser.open({ path: `?device=${device}` });
   await visitor.until('idle');
   await visitor.forget();
   await visitor.page.click('#sample');
@@ -42,8 +42,8 @@ test('no long task from the click on the sample to the exported file', () => wit
   return tasks;
 }));
 
-test('the view can be turned while the mesh is still growing', () => withoutLongTasks(async () => {
-  const visitor = await browser.open({ path: '?sample' });
+for (const device of ['gpu', 'auto']) test(`the view can be turned while the mesh is still growing; device ${device}`, () => withoutLongTasks(async () => {
+  const visitor = await browser.open({ path: `?sample&device=${device}` });
   const { page } = visitor;
   await visitor.event('bricks');
   await page.click('#pause');

@@ -74,7 +74,7 @@ test('a room without depth is planned, matched, looked at and saved', async (t) 
   await visitor.close();
 });
 
-for (const device of ['auto', 'cpu']) {
+for (const device of ['gpu', 'cpu']) {
   test(`a real scan, photos alone: in time, and as on the command line; device ${device}`, async (t) => {
     const path = join(root, '../shared/scans/hololens/scan');
     if (!existsSync(path)) {
@@ -140,7 +140,7 @@ test('with depth and photos there is a choice, and the sensor comes first', asyn
   await visitor.close();
 });
 
-for (const device of ['auto', 'cpu']) {
+for (const device of ['gpu', 'cpu']) {
   test(`matching can be held, goes on, and can be stopped with what is there; device ${device}`, async (t) => {
     const visitor = await browser.open({ path: `?sample&autostart=0&device=${device}` });
     const { page } = visitor;
@@ -176,8 +176,8 @@ for (const device of ['auto', 'cpu']) {
   });
 }
 
-test('the view can be turned while views are matched', async (t) => {
-  const visitor = await browser.open({ path: '?sample&autostart=0' });
+for (const device of ['gpu', 'auto']) test(`the view can be turned while views are matched; device ${device}`, async (t) => {
+  const visitor = await browser.open({ path: `?sample&autostart=0&device=${device}` });
   const { page } = visitor;
   await visitor.until('planned');
   await choose(visitor, { 'Depth from': 'stereo', 'Photos scaled to': '160 × 120', Keyframes: '30' });

@@ -105,7 +105,9 @@ def box(image, radius):
 
 
 def sweep_numpy(reference, sources, base, offsets, config, threads=1):
-    """Cost [height, width, planes]: 1 - the mean of the best share of the correlations; 1 where no source sees."""
+    """Cost [height, width, planes]: 1 - the mean of the best share of the correlations; 1 where no source sees. Samples are whole steps of a grey
+    level."""
+    steps = 64 if config["radius"] <= 2 else 32
     gray, radius = reference.gray, config["radius"]
     kind = gray.dtype.type
     rows, columns = np.mgrid[: gray.shape[0], : gray.shape[1]]
@@ -123,6 +125,7 @@ def sweep_numpy(reference, sources, base, offsets, config, threads=1):
         scores = np.empty((len(sources),) + gray.shape, gray.dtype)
         for k, (source, (at_infinity, b)) in enumerate(zip(sources, warps)):
             other, seen = sample(source.gray, at_infinity, b, rho)
+            other = np.round(other * steps) / steps
             total = box(other, radius)
             covariance = box(gray * other, radius) - mean * total
             spread = np.maximum(box(other * other, radius) - total * total / count, 0) + noise

@@ -68,3 +68,18 @@ export function failures(text) {
   const found = faults.flatMap((fault) => [...plain(text).matchAll(fault)].map(([, said]) => said.trim()));
   return found.length > 0 ? found.join('\n\n') : plain(text).split('\n').slice(-100).join('\n').trim();
 }
+
+/** The files of `node --test` with a test that failed. */
+export const failedFiles = (text) => [...new Set([...plain(text).matchAll(/^test at (.+?\.test\.mjs):/gm)].map(([, file]) => file))];
+
+/** The targets of cargo whose tests failed, as arguments that choose them: `--test eval`, `--lib`. */
+export const failedTargets = (text) => [...new Set([...plain(text).matchAll(/^ {4}`-p \S+ (--.+)`$/gm)].map(([, target]) => target))].flatMap((target) => target.split(' '));
+
+/**
+ * The count after a second try of what failed: what passes then has passed. A second run that finds no test, or that broke, mends nothing.
+ * @param {Count} first @param {Count} second @returns {Count}
+ */
+export function afterSecondTry(first, second) {
+  const failed = Math.max(second.failed, second.passed === 0 ? first.failed : 0);
+  return { ...first, passed: Math.max(0, first.passed + first.failed - failed), failed };
+}

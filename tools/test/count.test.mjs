@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { count, failures, reasons, sum } from './count.mjs';
+import { afterSecondTry, count, failedFiles, failedTargets, failures, reasons, sum } from './count.mjs';
 
 const of = (passed, failed, skipped) => ({ passed, failed, skipped });
 
@@ -57,4 +57,18 @@ test('where nothing says what failed, the end is shown', () => {
   const output = Array.from({ length: 300 }, (_, i) => `line ${i}`).join('\n');
   assert.ok(failures(`${output}\nerror: could not compile`).endsWith('line 299\nerror: could not compile'));
   assert.ok(!failures(output).includes('line 199\n'));
+});
+
+test('a second run is of what failed, by file and by target', () => {
+  const node = 'test at tests/a.test.mjs:3:1\n✖ b\ntest at tests/a.test.mjs:9:1\n✖ c\ntest at tests/d.test.mjs:9:1\n✖ d\n';
+  assert.deepEqual(failedFiles(node), ['tests/a.test.mjs', 'tests/d.test.mjs']);
+  const cargo = 'error: 2 targets failed:\n    `-p recon --lib`\n    `-p cli --test bench_command`\n';
+  assert.deepEqual(failedTargets(cargo), ['--lib', '--test', 'bench_command']);
+  assert.deepEqual(failedTargets('error: could not compile `recon`'), []);
+});
+
+test('what passes on its second try has passed; a second run that broke mends nothing', () => {
+  assert.deepEqual(afterSecondTry(of(70, 2, 1), of(9, 0, 0)), of(72, 0, 1));
+  assert.deepEqual(afterSecondTry(of(70, 2, 1), of(8, 1, 0)), of(71, 1, 1));
+  assert.deepEqual(afterSecondTry(of(70, 2, 1), of(0, 1, 0)), of(70, 2, 1));
 });

@@ -1,10 +1,12 @@
-// The lanes of `npm test`, in the order in which a mistake shows soonest. A lane is a list of commands; each says how its tests are counted.
+// The lanes of `npm test`, in the order in which a mistake shows soonest. A lane is a list of commands; each says how its tests are counted,
+// and those with figures in seconds how to run what failed a second time, when whatever else the machine did may be over.
 import { existsSync, readdirSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { buildEnv, gpu, python, wasmEnv } from '../env.mjs';
 import { must, root, run } from '../run.mjs';
 import { target } from '../setup/wasm.mjs';
+import { failedFiles, failedTargets } from './count.mjs';
 
 const at = (...parts) => join(root, ...parts);
 const tsc = at('node_modules/typescript/bin/tsc');
@@ -14,15 +16,28 @@ const nothing = (why) => ({ program: process.execPath, args: ['-e', `console.err
 
 const check = (program, ...args) => ({ program, args, env: buildEnv(), count: 'check' });
 
+/** The arguments of a second run, or null where the output does not name what failed. */
+const someOf = (failed, args) => (output) => {
+  const found = failed(output);
+  return found.length > 0 ? args(found) : null;
+};
+
 /** `node --test` of the test files of some folders, one after the other: some of their figures are times. */
 function nodeTests(...folders) {
   const files = folders.filter((folder) => existsSync(at(folder)))
     .flatMap((folder) => readdirSync(at(folder)).filter((name) => name.endsWith('.test.mjs')).sort().map((name) => join(folder, name)));
   if (files.length === 0) return nothing(`no *.test.mjs in ${folders.join(', ')}`);
-  return { program: process.execPath, args: ['--test', '--test-concurrency=1', '--test-reporter=spec', ...files], env: buildEnv(), count: 'node' };
+  const of = (files) => ['--test', '--test-concurrency=1', '--test-reporter=spec', ...files];
+  return { program: process.execPath, args: of(files), env: buildEnv(), count: 'node', again: someOf(failedFiles, of) };
 }
 
 const cargo = (env, ...args) => ({ program: 'cargo', args, env, count: 'check' });
+
+/** Every test of every crate. What failed is run again by the name of its target, never of its package: that would change burn's features. */
+function native() {
+  const of = (targets) => ['test', '--release', '--workspace', '--no-fail-fast', ...targets, '--', '--show-output'];
+  return { ...cargo(gpu(buildEnv()), ...of([])), count: 'cargo', again: someOf(failedTargets, of) };
+}
 
 /** The crates whose kernels are tested under Node: those with wasm-bindgen-test among their dependencies for tests. */
 async function kernelCrates() {
@@ -51,7 +66,7 @@ export const lanes = {
   types: async () => [check(process.execPath, tsc, '--noEmit', '-p', 'tsconfig.json')],
   tools: async () => [nodeTests('tools', 'tools/bench', 'tools/test')],
   clippy: async () => [cargo(buildEnv(), 'clippy', '--locked', '--release', '--workspace', '--all-targets', '--', '-D', 'warnings'), await wasmClippy()],
-  native: async () => [{ ...cargo(gpu(buildEnv()), 'test', '--release', '--workspace', '--no-fail-fast', '--', '--show-output'), count: 'cargo' }],
+  native: async () => [native()],
   build: async () => [check(process.execPath, 'tools/build.mjs')],
   wasm: async () => [await kernels()],
   browser: async () => [nodeTests('tests/browser')],

@@ -1,14 +1,17 @@
 //! Between the messages and the rooms' own types.
 
+use crate::handoff::Soup;
 use crate::messages::{
-    DepthSource, FindingMessage, InputEvent, PixelSize, PlanSummary, PresetName, RunOptions,
-    ShadingMode, StageName, ViewOptions,
+    BrickMessage, CameraMessage, DepthSource, FindingMessage, InputEvent, PixelSize, PlanSummary,
+    PresetName, RunOptions, ShadingMode, StageName, ViewOptions,
 };
 use crate::platform;
+use glam::Affine3A;
+use mesh::{camera::Pinhole, soup::VERTEX_FLOATS};
 use recon::{Level, NetworkConfig, Options, Plan, Preset, Rates, Stage};
 use scan::{Finding, Gravity, GravitySource};
 use stereo::StereoConfig;
-use view::{Input, Look, PointerKind, Shading, Theme};
+use view::{CameraPose, Input, Look, PointerKind, Shading, Theme};
 
 pub fn options(message: RunOptions) -> Options {
     Options {
@@ -76,21 +79,17 @@ fn depth_source(source: recon::DepthSource) -> DepthSource {
     }
 }
 
-/// A plan for the page. `apart` says that the network works on the processor while the rest has a device of its own.
-pub fn plan_summary(plan: &Plan, apart: bool, rates: Option<Rates>) -> PlanSummary {
-    let (device_bytes, heap_bytes) = match apart {
-        true => (plan.device_bytes, plan.heap_bytes + plan.network_bytes),
-        false => (plan.device_bytes + plan.network_bytes, plan.heap_bytes),
-    };
+/// A plan for the page.
+pub fn plan_summary(plan: &Plan, rates: Option<Rates>) -> PlanSummary {
     PlanSummary {
         options: run_options(plan),
         depth: depth_source(plan.depth),
         frames: plan.frames as u32,
         keyframes: plan.keyframes.len() as u32,
         bricks: plan.bricks as u32,
-        device_bytes: device_bytes as f64,
+        device_bytes: (plan.device_bytes + plan.network_bytes) as f64,
         // What the engine holds already stays.
-        heap_bytes: heap_bytes as f64 + platform::heap_bytes(),
+        heap_bytes: plan.heap_bytes as f64 + platform::heap_bytes(),
         expected_s: rates.map(|rates| plan.work.seconds(&rates)),
         download_bytes: None,
         remarks: plan.remarks.clone(),
@@ -193,4 +192,39 @@ pub fn input(event: InputEvent) -> Option<Input> {
         InputEvent::Blur => Input::Blur,
         InputEvent::DoubleClick { .. } => return None,
     })
+}
+
+/// A camera for the view in another worker.
+pub fn camera_message(pose: &CameraPose) -> CameraMessage {
+    let lens = pose.pinhole;
+    CameraMessage {
+        world_from_camera: pose.world_from_camera.to_cols_array(),
+        size: [lens.width, lens.height],
+        lens: [lens.fx, lens.fy, lens.cx, lens.cy],
+    }
+}
+
+/// A camera from the engine in another worker.
+pub fn camera_pose(message: &CameraMessage) -> CameraPose {
+    let ([width, height], [fx, fy, cx, cy]) = (message.size, message.lens);
+    CameraPose {
+        world_from_camera: Affine3A::from_cols_array(&message.world_from_camera),
+        pinhole: Pinhole {
+            width,
+            height,
+            fx,
+            fy,
+            cx,
+            cy,
+        },
+    }
+}
+
+/// Bricks for the view in another worker; their numbers travel beside them.
+pub fn brick_messages(soup: &Soup) -> Vec<BrickMessage> {
+    let bricks = soup.bricks();
+    let message = |(brick, numbers): ([i32; 3], &[f32])| {
+        BrickMessage(brick, (numbers.len() / VERTEX_FLOATS) as u32)
+    };
+    bricks.map(message).collect()
 }

@@ -2,13 +2,11 @@
 
 use crate::{
     messages::{DeviceChoice, Event},
+    page::Page,
     stage::Gpu,
 };
 use burn::tensor::{Device, wgpu::WgpuSetup};
-use js_sys::Function;
 use recon::Limits;
-use tsify::Tsify;
-use wasm_bindgen::JsValue;
 
 /// The largest binding that is used even where more is allowed.
 const BINDING_BYTES: u64 = 1 << 30;
@@ -19,9 +17,8 @@ const SOFTWARE: [&str; 3] = ["swiftshader", "llvmpipe", "lavapipe"];
 
 /// What was found.
 pub struct Found {
+    /// To compute on: never an adapter that is the processor in disguise, unless that was asked for. The processor itself is several times as fast.
     pub device: Device,
-    /// Where the network works: a processor that plays GPU is slower at that than the processor itself.
-    pub network_device: Device,
     pub limits: Limits,
     /// To draw with; without it the processor draws.
     pub gpu: Option<Gpu>,
@@ -30,8 +27,8 @@ pub struct Found {
 }
 
 impl Found {
-    /// The device of this choice, or the processor. `emit` is told if the device is lost later.
-    pub async fn of(choice: DeviceChoice, emit: &Function) -> Self {
+    /// The device of this choice, or the processor. The page is told if the device is lost later.
+    pub async fn of(choice: DeviceChoice, page: &Page) -> Self {
         let asked = "The processor does the work, as was asked for";
         if choice == DeviceChoice::Cpu {
             return Self::processor("", asked);
@@ -39,7 +36,7 @@ impl Found {
         let options = Device::wgpu_options().tasks_max(TASKS_A_SUBMIT);
         match options.init_with_setup_async().await {
             Ok((device, setup)) => {
-                tell_loss(&setup.device, emit.clone());
+                tell_loss(&setup.device, page.clone());
                 Self::adapter(device, setup, choice)
             }
             // The error's words are for the report; the visitor is told what it means.
@@ -53,14 +50,9 @@ impl Found {
     fn processor(why: &str, note: &str) -> Self {
         Self {
             device: Device::flex(),
-            network_device: Device::flex(),
             limits: Limits::default(),
             gpu: None,
-            ready: Event::Ready {
-                device: "cpu".to_owned(),
-                adapter: format!("burn flex, one thread{why}"),
-                note: Some(note.to_owned()),
-            },
+            ready: on_processor(why, note),
         }
     }
 
@@ -71,24 +63,30 @@ impl Found {
         let is_software = SOFTWARE.iter().any(|name| lower.contains(name))
             || info.device_type == wgpu::DeviceType::Cpu;
         let binding_bytes = setup.device.limits().max_storage_buffer_binding_size;
-        let apart = is_software && choice == DeviceChoice::Auto;
+        let gpu = Some(Gpu {
+            instance: setup.instance,
+            adapter: setup.adapter,
+            device: setup.device,
+            queue: setup.queue,
+            is_software,
+        });
+        if is_software && choice == DeviceChoice::Auto {
+            return Self {
+                gpu,
+                ready: on_processor(
+                    &format!("; drawn by {}", words.trim()),
+                    "This graphics adapter is software: it draws, and the processor does the work, which takes longer",
+                ),
+                ..Self::processor("", "")
+            };
+        }
         Self {
-            network_device: match apart {
-                true => Device::flex(),
-                false => device.clone(),
-            },
             device,
             limits: Limits {
                 binding_bytes: binding_bytes.min(BINDING_BYTES) as usize,
-                network_is_bound: !apart,
+                network_is_bound: true,
             },
-            gpu: Some(Gpu {
-                instance: setup.instance,
-                adapter: setup.adapter,
-                device: setup.device,
-                queue: setup.queue,
-                is_software,
-            }),
+            gpu,
             ready: Event::Ready {
                 device: "webgpu".to_owned(),
                 adapter: words.trim().to_owned(),
@@ -98,15 +96,20 @@ impl Found {
     }
 }
 
-fn tell_loss(device: &wgpu::Device, emit: Function) {
+fn on_processor(why: &str, note: &str) -> Event {
+    Event::Ready {
+        device: "cpu".to_owned(),
+        adapter: format!("burn flex, one thread{why}"),
+        note: Some(note.to_owned()),
+    }
+}
+
+fn tell_loss(device: &wgpu::Device, page: Page) {
     device.set_device_lost_callback(move |reason, message| {
-        let event = Event::Failed {
-            code: "device".to_owned(),
-            message: format!("The graphics device was lost ({reason:?}: {message})"),
-            advice: "Start again, with larger voxels if it happens again.".to_owned(),
-        };
-        if let Ok(event) = event.into_js() {
-            let _ = emit.call1(&JsValue::NULL, &event);
-        }
+        page.fail(
+            "device",
+            format!("The graphics device was lost ({reason:?}: {message})"),
+            "Start again, with larger voxels if it happens again.".to_owned(),
+        );
     });
 }

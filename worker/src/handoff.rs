@@ -1,10 +1,11 @@
 //! From burn's tensors to the picture: on the GPU by a copy from burn's buffer into the arena's, never through the heap.
 
+use crate::messages::BrickMessage;
 use burn_cubecl::CubeBackend;
 use cubecl::wgpu::{AutoCompiler, WgpuServer};
 use mesh::soup::{VERTEX_FLOATS, VERTEX_STRIDE_BYTES};
 use std::ops::Range;
-use view::{Arena, CpuPainter};
+use view::Arena;
 use volume::{Brick, BrickMeshes, VolumeError};
 
 fn lost(error: impl std::fmt::Debug) -> VolumeError {
@@ -53,7 +54,7 @@ pub fn to_arena(
     Ok(())
 }
 
-/// Reads bricks, for the painter that works without a GPU.
+/// Reads bricks, for a view that does not share their device.
 pub async fn read(meshes: BrickMeshes) -> Result<Soup, VolumeError> {
     let BrickMeshes { vertices, ranges } = meshes;
     let data = vertices.into_data_async().await.map_err(lost)?;
@@ -61,18 +62,33 @@ pub async fn read(meshes: BrickMeshes) -> Result<Soup, VolumeError> {
     Ok(Soup { numbers, ranges })
 }
 
-/// Bricks in main memory.
+/// Bricks and their vertices in main memory.
 pub struct Soup {
-    numbers: Vec<f32>,
+    /// Of all bricks.
+    pub numbers: Vec<f32>,
     ranges: Vec<(Brick, Range<usize>)>,
 }
 
 impl Soup {
-    /// Gives the bricks to a painter.
-    pub fn hand_to(&self, painter: &mut CpuPainter) {
-        for (brick, rows) in &self.ranges {
-            let numbers = rows.start * VERTEX_FLOATS..rows.end * VERTEX_FLOATS;
-            painter.insert(brick.to_array(), &self.numbers[numbers]);
+    /// Of bricks that follow each other in `numbers`, as another worker sends them. Those that have no room there stay out.
+    pub fn received(bricks: &[BrickMessage], numbers: Vec<f32>) -> Self {
+        let (mut ranges, mut start) = (Vec::with_capacity(bricks.len()), 0);
+        for &BrickMessage(brick, vertices) in bricks {
+            let end = start + vertices as usize;
+            if end * VERTEX_FLOATS > numbers.len() {
+                break;
+            }
+            ranges.push((Brick::from_array(brick), start..end));
+            start = end;
         }
+        Self { numbers, ranges }
+    }
+
+    /// Each brick with its part of the numbers.
+    pub fn bricks(&self) -> impl Iterator<Item = ([i32; 3], &[f32])> {
+        self.ranges.iter().map(|(brick, rows)| {
+            let part = rows.start * VERTEX_FLOATS..rows.end * VERTEX_FLOATS;
+            (brick.to_array(), &self.numbers[part])
+        })
     }
 }

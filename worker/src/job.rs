@@ -9,16 +9,13 @@ use crate::{
     sink::PageSink,
     weights::Fault,
 };
-use js_sys::{Promise, Uint8Array};
+use js_sys::Uint8Array;
 use recon::{DepthSource, Options, Preset, RunError};
 use scan::{Scan, ScanError, Source, ZipSource};
 use std::rc::Rc;
 use stereo::StereoError;
 use view::CameraPose;
 use volume::VolumeError;
-use wasm_bindgen::JsValue;
-use wasm_bindgen_futures::JsFuture;
-use web_sys::{Blob, ImageEncodeOptions};
 
 /// Where a scan comes from.
 pub enum Origin {
@@ -137,11 +134,7 @@ pub fn plan(engine: &Rc<Engine>, options: Options) -> bool {
     match recon::plan(&scan, &engine.limits, options) {
         Ok(plan) => {
             engine.emit(&Event::Planned {
-                plan: convert::plan_summary(
-                    &plan,
-                    engine.network_is_apart(),
-                    engine.rates.get().rates(),
-                ),
+                plan: convert::plan_summary(&plan, engine.rates.get().rates()),
             });
             let frames = plan.keyframes.iter().map(|&frame| &scan.frames()[frame]);
             let poses = frames.map(|frame| CameraPose {
@@ -151,7 +144,8 @@ pub fn plan(engine: &Rc<Engine>, options: Options) -> bool {
                     DepthSource::Stereo(_) | DepthSource::Network(_) => &frame.color_camera,
                 }),
             });
-            engine.set_cameras(&poses.collect::<Vec<_>>());
+            let poses: Vec<_> = poses.collect();
+            engine.screen.set_cameras(scan.name(), &poses);
             engine.set_plan(plan);
             true
         }
@@ -196,7 +190,7 @@ pub async fn run(engine: Rc<Engine>, options: RunOptions) {
     engine.given.clear();
     match result {
         Ok(outcome) => {
-            let (_, triangles) = engine.counts();
+            let (_, triangles) = engine.screen.counts();
             let event = Event::Finished {
                 cancelled: outcome.stopped,
                 frames: outcome.frames_fused as u32,
@@ -268,42 +262,13 @@ pub async fn export(engine: Rc<Engine>, id: u32, format: MeshFormat, canonical: 
         file_name: format!("{}.{ending}", file_stem(scan.name())),
         mime: mime.to_owned(),
     };
-    engine.emit_with(&event, &Uint8Array::from(bytes.as_slice()));
-}
-
-/// A picture of the view.
-pub async fn screenshot(engine: Rc<Engine>, id: u32) {
-    match picture(&engine).await {
-        Ok(bytes) => {
-            let name = engine
-                .scan()
-                .map_or("ipdrecon".to_owned(), |scan| file_stem(scan.name()));
-            let event = Event::Exported {
-                id,
-                file_name: format!("{name}.png"),
-                mime: "image/png".to_owned(),
-            };
-            engine.emit_with(&event, &bytes);
-        }
-        Err(error) => {
-            let message = format!("The picture could not be made ({error:?})");
-            engine.fail("export", message, "Try again.".to_owned());
-        }
-    }
-}
-
-async fn picture(engine: &Engine) -> Result<Uint8Array, JsValue> {
-    let canvas = engine.painted_canvas().ok_or("there is no canvas")?;
-    let options = ImageEncodeOptions::new();
-    options.set_type("image/png");
-    let blob: Promise = canvas.convert_to_blob_with_options(&options)?;
-    let blob: Blob = JsFuture::from(blob).await?.into();
-    let buffer = blob.array_buffer();
-    Ok(Uint8Array::new(&JsFuture::from(buffer).await?))
+    engine
+        .page
+        .tell_with(&event, &Uint8Array::from(bytes.as_slice()));
 }
 
 /// A scan's name as a file's: without its ending, and without what file systems refuse.
-fn file_stem(name: &str) -> String {
+pub fn file_stem(name: &str) -> String {
     let stem = name.strip_suffix(".zip").unwrap_or(name);
     let kept = stem.chars().map(|c| {
         if c.is_alphanumeric() || "-_.".contains(c) {

@@ -1,4 +1,4 @@
-//! The engine in the browser: compute and renderer in one module worker, on one device.
+//! The engine in the browser: on WebGPU compute and renderer in one module worker, on one device; where the processor computes, each in a worker of its own.
 //!
 //! The only place with wasm-bindgen. Typed messages come in ([`messages::Request`]), events go out ([`messages::Event`]);
 //! the work itself is `recon`'s, the pictures are `view`'s.
@@ -13,10 +13,14 @@ mod handle;
 mod handoff;
 mod job;
 pub mod messages;
+mod page;
+mod picture;
 mod platform;
 mod rates;
+mod screen;
 mod sink;
 mod stage;
+mod viewer;
 mod weights;
 
 pub use handle::Handle;

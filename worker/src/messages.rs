@@ -4,8 +4,10 @@
 //! Binary things travel beside the message: files as structured-clone `File`s, the canvas as a transferred
 //! `OffscreenCanvas`, exports and pictures as `Uint8Array`.
 
+mod drawing;
 mod view;
 
+pub use drawing::{BrickMessage, CameraMessage, Drawing};
 use serde::{Deserialize, Serialize};
 use tsify::Tsify;
 pub use view::{InputEvent, LookAt, ShadingMode, ViewOptions};
@@ -104,7 +106,7 @@ pub enum Request {
 #[derive(Deserialize, Tsify, Clone, Copy, PartialEq, Eq)]
 #[serde(rename_all = "camelCase")]
 pub enum DeviceChoice {
-    /// WebGPU if it is there, otherwise the CPU. An adapter that is software leaves the network to the CPU.
+    /// WebGPU if it is there, otherwise the CPU. An adapter that is software draws, and leaves the rest to the CPU.
     Auto,
     /// WebGPU for everything, even where the adapter is software: to try on one machine what happens on another.
     Gpu,

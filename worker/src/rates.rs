@@ -30,7 +30,7 @@ impl Measured {
     }
 }
 
-/// Measures the engine's devices unless that is done: some 100 ms each, and the first kernels' compilation. Begun while the visitor
+/// Measures the engine's device unless that is done: some 100 ms, and the first kernels' compilation. Begun while the visitor
 /// looks for a scan, and waited for before the first plan.
 pub async fn measure(engine: Rc<Engine>) {
     if let Measured::Not = engine.rates.get() {
@@ -43,15 +43,8 @@ pub async fn measure(engine: Rc<Engine>) {
 }
 
 async fn of(engine: &Engine) -> Option<Rates> {
-    let fusing = fusing_rate(&engine.device, now_s).await?;
-    let volume = arithmetic_rate(&engine.device, now_s).await?;
-    let network = match engine.network_is_apart() {
-        true => arithmetic_rate(&engine.network_device, now_s).await?,
-        false => volume,
-    };
     Some(Rates {
-        fusing,
-        volume,
-        network,
+        fusing: fusing_rate(&engine.device, now_s).await?,
+        arithmetic: arithmetic_rate(&engine.device, now_s).await?,
     })
 }

@@ -55,7 +55,7 @@ impl Sink for PageSink {
     }
 
     fn progress(&mut self, done: usize) {
-        let (_, triangles) = self.engine.counts();
+        let (_, triangles) = self.engine.screen.counts();
         self.engine.emit(&Event::Progress {
             done: done as u32,
             total: self.total as u32,
@@ -78,7 +78,7 @@ impl Sink for PageSink {
     fn keep(&mut self, stage: Stage, made: Vec<u8>) {
         let stage = convert::stage_name(stage);
         let bytes = Uint8Array::from(made.as_slice());
-        self.engine.emit_with(&Event::Kept { stage }, &bytes);
+        self.engine.page.tell_with(&Event::Kept { stage }, &bytes);
     }
 
     fn kept(&mut self, stage: Stage) -> Option<Vec<u8>> {
@@ -86,16 +86,16 @@ impl Sink for PageSink {
     }
 
     fn eye(&self) -> Option<Vec3> {
-        self.engine.eye()
+        self.engine.screen.eye()
     }
 
     fn surface(&mut self, brick_size_m: f32) {
-        self.engine.replace_bricks(brick_size_m);
+        self.engine.screen.clear(brick_size_m, false);
     }
 
     async fn bricks(&mut self, meshes: BrickMeshes) -> Result<(), VolumeError> {
-        self.engine.show(meshes).await?;
-        let (bricks, triangles) = self.engine.counts();
+        self.engine.screen.show(meshes).await?;
+        let (bricks, triangles) = self.engine.screen.counts();
         self.engine.emit(&Event::Bricks { bricks, triangles });
         Ok(())
     }
@@ -104,7 +104,7 @@ impl Sink for PageSink {
         let now_ms = platform::now_ms();
         let hand_ms = ((now_ms - self.step_ms) * HAND_SHARE).min(HAND_MS);
         platform::sleep_ms(0).await;
-        while self.engine.is_touched() && platform::now_ms() - now_ms < hand_ms {
+        while self.engine.screen.is_touched() && platform::now_ms() - now_ms < hand_ms {
             platform::sleep_ms(FRAME_MS).await;
         }
         if self.engine.state() == RunState::Pausing {

@@ -39,13 +39,6 @@ pub struct Stage {
     pick_at: Option<Vec2>,
 }
 
-/// Bricks on their way to the stage: one value at a time, so that its size costs nothing.
-#[allow(clippy::large_enum_variant)]
-pub enum Bricks {
-    OnDevice(BrickMeshes),
-    Read(Soup),
-}
-
 // One of each in a worker: the difference in size costs nothing.
 #[allow(clippy::large_enum_variant)]
 enum Paper {
@@ -122,20 +115,36 @@ impl Stage {
         }
     }
 
-    /// Whether bricks must be read from the device before [`Stage::show`] can take them.
-    pub fn reads_bricks(&self) -> bool {
-        matches!(self.paper, Paper::Cpu { .. })
+    /// Shows new versions of bricks that are on the stage's own device.
+    pub fn show(&mut self, meshes: BrickMeshes) -> Result<(), VolumeError> {
+        if let Paper::Gpu { gpu, arena, .. } = &mut self.paper {
+            handoff::to_arena(meshes, arena, &gpu.device, &gpu.queue)?;
+        }
+        self.surround();
+        Ok(())
     }
 
-    /// Shows new versions of bricks, in the form that [`Stage::reads_bricks`] asks for.
-    pub fn show(&mut self, bricks: Bricks) -> Result<(), VolumeError> {
-        match (&mut self.paper, bricks) {
-            (Paper::Gpu { gpu, arena, .. }, Bricks::OnDevice(meshes)) => {
-                handoff::to_arena(meshes, arena, &gpu.device, &gpu.queue)?;
+    /// Shows new versions of bricks that are in main memory.
+    pub fn show_soup(&mut self, soup: &Soup) -> Result<(), VolumeError> {
+        match &mut self.paper {
+            Paper::Gpu { gpu, arena, .. } => {
+                for (brick, numbers) in soup.bricks() {
+                    let inserted = arena.insert_from_slice(&gpu.queue, brick, numbers);
+                    inserted.map_err(|error| VolumeError::Device(error.to_string()))?;
+                }
             }
-            (Paper::Cpu { painter, .. }, Bricks::Read(soup)) => soup.hand_to(painter),
-            _ => return Ok(()),
+            Paper::Cpu { painter, .. } => {
+                for (brick, numbers) in soup.bricks() {
+                    painter.insert(brick, numbers);
+                }
+            }
         }
+        self.surround();
+        Ok(())
+    }
+
+    /// Tells the floor and the camera how large the scene is now.
+    fn surround(&mut self) {
         let (outline, bounds) = match &self.paper {
             Paper::Gpu { arena, .. } => (arena.outline(), arena.bounds()),
             Paper::Cpu { painter, .. } => (painter.outline(), painter.bounds()),
@@ -144,7 +153,6 @@ impl Stage {
             self.look.floor_height_m = min.z;
         }
         self.controls.set_outline(outline);
-        Ok(())
     }
 
     /// Bricks and triangles on show.

@@ -84,7 +84,7 @@ impl Weights {
     /// Has the kernels compiled beside whatever goes on. A device that fails at that fails the run, which says so.
     fn warm_up(&self, engine: &Rc<Engine>, config: NetworkConfig) {
         if !self.warming.replace(true) {
-            let (warming, device) = (self.warming.clone(), engine.network_device.clone());
+            let (warming, device) = (self.warming.clone(), engine.device.clone());
             spawn_local(async move {
                 // Messages and the download come first.
                 platform::sleep_ms(0).await;
@@ -104,7 +104,7 @@ impl Weights {
     }
 
     fn take(&self, engine: &Engine, blob: Blob) -> Result<Rc<Ipdrecon>, Fault> {
-        let network = weights::load(&WeightsBlob(blob), &engine.network_device);
+        let network = weights::load(&WeightsBlob(blob), &engine.device);
         let network = Rc::new(network.map_err(|error| Fault::of(&error.to_string()))?);
         self.network.replace(Some(network.clone()));
         Ok(network)

@@ -1,11 +1,13 @@
 /**
  * The module worker: loads the engine, hands it messages and hands its events on. It queues what comes before the engine
- * is up, and it turns a crash of the engine into one sentence for the visitor instead of a page that stands still.
+ * is up, and it turns a crash of the engine into one sentence for the visitor instead of a page that stands still. Where the processor
+ * computes, it draws alone and starts the same script once more as a {@link Runner}.
  */
 import init, { Engine } from "./engine.js";
-import type { Event, Request } from "./engine.js";
+import type { Drawing, Event, Request } from "./engine.js";
 import { download, missing, type Progress } from "./download.js";
 import { released } from "./released.js";
+import { Runner, type FromRunner, type ToRunner } from "./runner.js";
 
 /** From the page to the worker: a request, and the binary things that travel beside it. */
 export interface ToWorker {
@@ -25,6 +27,10 @@ export interface FromWorker {
 const scope = self as unknown as DedicatedWorkerGlobalScope;
 const waiting: ToWorker[] = [];
 let engine: Engine | undefined;
+/** Where the work is done, if not here. */
+let runner: Runner | undefined;
+/** What the view alone answers. */
+const SHOWN: ReadonlySet<Request["type"]> = new Set(["input", "view", "look", "screenshot"]);
 /** Files that are read together. */
 const READS_AT_ONCE = 256;
 /** Scans that were to be opened so far. */
@@ -34,8 +40,10 @@ let dead = false;
 /** Bytes of weights that the network still has to wait for, as far as known. */
 let toFetch: number | undefined;
 
-scope.onmessage = ({ data }: MessageEvent<ToWorker>) => {
-  if (data.request.type === "start" && !started) {
+scope.onmessage = ({ data }: MessageEvent<ToWorker | ToRunner>) => {
+  if ("eye" in data) {
+    engine?.stand(...data.eye);
+  } else if (data.request.type === "start" && !started) {
     started = true;
     void start(data);
   } else if (engine) {
@@ -52,9 +60,11 @@ scope.addEventListener("error", (event) => {
 });
 scope.addEventListener("unhandledrejection", (event) => die(event.reason));
 
-async function start({ request, canvas }: ToWorker): Promise<void> {
+async function start({ request, canvas, ...beside }: ToWorker & { module?: WebAssembly.Module }): Promise<void> {
+  let module = beside.module;
   try {
-    await init({ module_or_path: new URL("./engine_bg.wasm", import.meta.url) });
+    module ??= await compile();
+    await init({ module_or_path: module });
   } catch (cause) {
     die(cause, "The engine could not be loaded", "Check the connection and reload the page.");
     return;
@@ -67,9 +77,10 @@ async function start({ request, canvas }: ToWorker): Promise<void> {
       toFetch = 0;
       return file;
     };
-    const up = await Engine.start(canvas, request, emit, bring);
+    const up = await Engine.start(canvas, request, emit, bring, beside.module ? draw : undefined);
+    if (canvas && !up.computes) runner = new Runner(up, request, module, relay, die);
     // The first plan says what has to be fetched.
-    await looked;
+    else await looked;
     engine = up;
     for (const message of waiting.splice(0)) void receive(up, message);
   } catch (cause) {
@@ -77,9 +88,19 @@ async function start({ request, canvas }: ToWorker): Promise<void> {
   }
 }
 
+/** The engine's code; also from a host that does not call it `application/wasm`. */
+async function compile(): Promise<WebAssembly.Module> {
+  const answer = await fetch(new URL("./engine_bg.wasm", import.meta.url));
+  if (!answer.ok) throw new Error(`${answer.url} answers ${answer.status} ${answer.statusText}`.trim());
+  const streams = answer.headers.get("content-type")?.startsWith("application/wasm");
+  return streams ? WebAssembly.compileStreaming(answer) : WebAssembly.compile(await answer.arrayBuffer());
+}
+
 /** Hands a message on; of a folder the texts are read first, unless another scan is opened meanwhile. */
 async function receive(to: Engine, message: ToWorker): Promise<void> {
   const { request, files = [] } = message;
+  if (runner && !SHOWN.has(request.type)) return runner.send(message);
+  if (request.type === "input" || request.type === "look") runner?.lookAgain();
   if (request.type.startsWith("open")) opened += 1;
   if (request.type !== "openFolder") return deliver(to, message, []);
   const mine = opened;
@@ -111,14 +132,24 @@ function deliver(to: Engine, { request, files }: ToWorker, texts: (string | unde
 }
 
 function emit(event: Event, payload?: Uint8Array): void {
-  if (dead) return;
-  // What the engine says about its own end is better than what could be said here about the trap that follows it.
-  dead = event.type === "failed" && (event.code === "internal" || !engine);
   if (event.type === "weights") toFetch = 0;
   if (event.type === "planned" && event.plan.depth === "network") event.plan.downloadBytes = toFetch;
-  const bytes = payload as Uint8Array<ArrayBuffer> | undefined;
-  const message: FromWorker = { event, payload: bytes };
-  scope.postMessage(message, bytes ? [bytes.buffer] : []);
+  relay({ event, payload: payload as Uint8Array<ArrayBuffer> | undefined });
+}
+
+/** Hands an event to who listens. */
+function relay(message: FromWorker): void {
+  if (dead) return;
+  const { event, payload } = message;
+  // What the engine says about its own end is better than what could be said here about the trap that follows it.
+  dead = event.type === "failed" && (event.code === "internal" || !engine);
+  scope.postMessage(message, payload ? [payload.buffer] : []);
+}
+
+/** Hands what is to be drawn to the worker that has the canvas. */
+function draw(drawing: Drawing, vertices?: Float32Array<ArrayBuffer>): void {
+  const message: FromRunner = { drawing, vertices };
+  if (!dead) scope.postMessage(message, vertices ? [vertices.buffer] : []);
 }
 
 /** What went wrong with the weights without stopping anything. */

@@ -75,11 +75,11 @@ export function drawPlan({ state, plan, ready, opened, weights }: Model): void {
   drawSize();
 }
 
-/** Without WebGPU the network is slow enough to be announced. */
+/** Without a graphics adapter the network is slow enough to be announced. */
 function onProcessor({ depth, options, expectedS }: PlanSummary, ready: Model["ready"]): string[] {
   if (ready?.device !== "cpu" || depth !== "network") return [];
   const time = expectedS === undefined ? "" : `, in ${about(expectedS)}`;
-  return [`No WebGPU: the processor does the work, with ${PRESETS[options.preset]}${time}`];
+  return [`The processor does the work, with ${PRESETS[options.preset]}${time}`];
 }
 
 /** Which of the sources there are to choose from, and why not all of them if so. */

@@ -71,11 +71,7 @@ fn rates(device: &Device) -> Rates {
         arithmetic / 1e9,
         start.elapsed().as_secs_f64() * 1e3
     );
-    Rates {
-        fusing,
-        volume: arithmetic,
-        network: arithmetic,
-    }
+    Rates { fusing, arithmetic }
 }
 
 /// Runs a scan and compares. On one thread, as in the browser.
@@ -149,8 +145,7 @@ fn of_the_sensors_depth() {
 fn even(rate: f64) -> Rates {
     Rates {
         fusing: rate,
-        volume: rate,
-        network: rate,
+        arithmetic: rate,
     }
 }
 

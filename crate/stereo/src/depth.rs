@@ -1,5 +1,6 @@
 //! The winning plane of every pixel, between two planes where the costs beside it say so.
 
+use crate::sweep::Spacing;
 use rayon::prelude::*;
 
 /// Planes this near to the winner do not count as another choice.
@@ -23,10 +24,7 @@ pub struct Raw {
 pub fn winners(cost: &[f32], sum: &[f32], base: Option<&[f32]>, offsets: &[f32]) -> Raw {
     let planes = offsets.len();
     let pixels = cost.len() / planes.max(1);
-    let step = match offsets {
-        [first, second, ..] => second - first,
-        _ => 0.0,
-    };
+    let spacing = Spacing::of(offsets);
     let winner = |at: usize| {
         let cells = at * planes..(at + 1) * planes;
         let (cost, sum) = (&cost[cells.clone()], &sum[cells]);
@@ -47,7 +45,7 @@ pub fn winners(cost: &[f32], sum: &[f32], base: Option<&[f32]>, offsets: &[f32])
             .filter(|(plane, _)| plane.abs_diff(best) > SAME);
         let second = others.fold(f32::MAX, |least, (_, &sum)| least.min(sum));
         let base = base.map_or(0.0, |base| base[at]);
-        let rho = base + offsets[best] + shift * step;
+        let rho = base + spacing.at(best as f32 + shift);
         (rho, (1.0 - cost[best], (second - sum[best]) / PATHS))
     };
     let (rho, (zncc, unique)) = (0..pixels).into_par_iter().map(winner).unzip();

@@ -1,5 +1,5 @@
 //! Matching as kernels, for WebGPU and its native relatives. The definitions are [`crate::sweep`], [`crate::smooth`] and
-//! [`crate::depth`]; numbers that cross memory between the kernels have 16 bits, which keeps ZNCC within 1e-3.
+//! [`crate::depth`]; numbers that cross memory between the kernels have 16 bits, and those forms round as these do.
 //!
 //! What bounds these kernels is the number of loads and stores, on a GPU as on a processor that plays one. So no window
 //! is ever looked at pixel by pixel: [`sweep`] has the layout, [`smooth`] the paths. Only the winners' maps are read back.
@@ -21,6 +21,7 @@ use crate::{
     smooth::SmoothConfig,
     sweep::SweepConfig,
     view::{View, warp},
+    window::{gray_steps, in_steps},
 };
 use burn::{
     Tensor,
@@ -120,15 +121,17 @@ impl FusedMatcher {
         let group_samples = 2 * count * across * down;
         let chunk = (SCRATCH_BYTES / (4 * group_samples)).clamp(1, groups);
 
+        let steps = gray_steps(radius);
         let slot = sources.iter().map(|(_, v)| v.gray.len()).max().unwrap_or(0);
         let mut pictures = match self.pictures.take() {
-            Some(pictures) if pictures.fits(slot, count) => pictures,
-            _ => Pictures::new(&self.device, slot, count)?,
+            Some(pictures) if pictures.fits(slot, count, steps) => pictures,
+            _ => Pictures::new(&self.device, slot, count, steps)?,
         };
         let places = pictures.places(&self.device, sources)?;
         let warps = upload(&self.device, warps(reference, sources, &places))?;
         let gray = upload(&self.device, reference.gray.clone())?;
-        let framed = framed(&self.device, &gray, width, height, radius)?;
+        let in_steps = upload(&self.device, in_steps(&reference.gray, steps))?;
+        let framed = framed(&self.device, &in_steps, width, height, radius)?;
         let base = base.map(|b| upload(&self.device, b.to_vec())).transpose()?;
         let has_base = base.is_some();
         let base_or_any = base.clone().unwrap_or_else(|| gray.clone());
@@ -190,7 +193,7 @@ impl FusedMatcher {
                     2 * first,
                     shape.first_rho,
                     shape.step,
-                    config.noise_var,
+                    config.noise_var * steps * steps,
                     r,
                     WIDE,
                     has_base,

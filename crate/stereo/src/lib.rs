@@ -20,6 +20,7 @@ pub mod smooth;
 pub mod sources;
 pub mod sweep;
 pub mod view;
+mod window;
 
 pub use config::StereoConfig;
 pub use driver::{DepthMap, Step, Stereo, VIEWS_KEPT};

@@ -236,11 +236,11 @@ fn step(cost: &[f32], before: &[f32], least: f32, p1: f32, p2: f32, path: &mut [
     let (before, path) = (&before[..planes], &mut path[..planes]);
     for d in 1..planes - 1 {
         let near = before[d - 1].min(before[d + 1]) + p1;
-        path[d] = cost[d] + before[d].min(far).min(near) - least;
+        path[d] = cost[d] + (before[d].min(far).min(near) - least);
     }
     let last = planes - 1;
-    path[0] = cost[0] + before[0].min(far).min(before[1] + p1) - least;
-    path[last] = cost[last] + before[last].min(far).min(before[last - 1] + p1) - least;
+    path[0] = cost[0] + (before[0].min(far).min(before[1] + p1) - least);
+    path[last] = cost[last] + (before[last].min(far).min(before[last - 1] + p1) - least);
     least_of(path)
 }
 

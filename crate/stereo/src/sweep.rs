@@ -2,10 +2,14 @@
 //!
 //! The hypothesis of pixel `p` on plane `d` is the inverse depth `rho = base(p) + offset[d]`. A source view is sampled
 //! there bilinearly and compared by zero-mean normalised cross-correlation over a square window, with the noise of a camera
-//! added to both variances: exposure and white balance cancel out, and blank walls match nothing rather than everything.
+//! added to both variances: exposure and white balance cancel out, and blank walls match nothing rather than everything. The sums
+//! are exact ([`crate::window`]).
 //! Of the sources that see the point the best share counts, since some are occluded (Kang, Szeliski and Chai 2001).
 
-use crate::view::{View, Warp, warp};
+use crate::{
+    view::{View, Warp, warp},
+    window::{COST_STEPS, Count, Level, Padded, SCORE_STEPS, gray_steps, in_steps, round},
+};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -13,8 +17,10 @@ use std::ops::Range;
 const BAND: usize = 16;
 /// Planes whose costs are gathered before they are written out, so that memory is written a run at a time.
 const BLOCK: usize = 8;
-/// Below every correlation: the source does not see the point.
-const UNSEEN: f32 = -2.0;
+/// Below every score: the source does not see the point.
+const UNSEEN: f32 = -2.0 * SCORE_STEPS;
+/// What a source sees is at least so far before it, as a multiple of the reference's depth.
+const LEAST_Z: f32 = 1e-6;
 /// An inverse depth cannot be less, in 1/m.
 pub(crate) const LEAST_RHO: f32 = 1e-3;
 
@@ -54,10 +60,16 @@ pub fn sweep_rows(
     let width = reference.size().0;
     let planes = offsets.len();
     let warps: Vec<Warp> = sources.iter().map(|s| warp(reference, s)).collect();
+    let steps = gray_steps(config.radius);
+    let pictures = sources.iter().map(|source| Picture {
+        steps: in_steps(&source.gray, steps),
+        size: source.size(),
+    });
+    let pictures: Vec<Picture> = pictures.collect();
     let mut cost = vec![1.0f32; rows.len() * width * planes];
     let job = Job {
         reference,
-        sources,
+        pictures: &pictures,
         warps: &warps,
         base,
         offsets,
@@ -72,46 +84,44 @@ pub fn sweep_rows(
     cost
 }
 
+/// Evenly spaced hypotheses. Every device makes them of the same two numbers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Spacing {
+    /// The first, in 1/m.
+    pub(crate) first: f32,
+    /// From one to the next, in 1/m.
+    pub(crate) step: f32,
+}
+
+impl Spacing {
+    /// Of a list of them.
+    pub(crate) fn of(offsets: &[f32]) -> Self {
+        let first = offsets.first().copied().unwrap_or_default();
+        let last = offsets.last().copied().unwrap_or_default();
+        let step = (last - first) / offsets.len().saturating_sub(1).max(1) as f32;
+        Self { first, step }
+    }
+
+    /// One of them, or between two.
+    #[inline(always)]
+    pub(crate) fn at(self, plane: f32) -> f32 {
+        self.first + self.step * plane
+    }
+}
+
 struct Job<'a> {
     reference: &'a View,
-    sources: &'a [&'a View],
+    pictures: &'a [Picture],
     warps: &'a [Warp],
     base: Option<&'a [f32]>,
     offsets: &'a [f32],
     config: &'a SweepConfig,
 }
 
-/// A row with room for a window beyond both ends, filled with zeros there.
-struct Padded<const R: usize>(Vec<f32>);
-
-impl<const R: usize> Padded<R> {
-    fn new(width: usize) -> Self {
-        Self(vec![0.0; width + 2 * R])
-    }
-
-    /// Sums some rows of `width` values.
-    #[inline(always)]
-    fn sum_rows(&mut self, rows: &[f32], width: usize) {
-        let to = &mut self.0[R..R + width];
-        let mut rows = rows.chunks_exact(width);
-        if let Some(first) = rows.next() {
-            to.copy_from_slice(first);
-        }
-        for row in rows {
-            for (to, from) in to.iter_mut().zip(row) {
-                *to += from;
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn window(&self, x: usize) -> f32 {
-        let mut sum = 0.0;
-        for k in 0..2 * R + 1 {
-            sum += self.0[x + k];
-        }
-        sum
-    }
+/// A source's grey values in steps.
+struct Picture {
+    steps: Vec<f32>,
+    size: (usize, usize),
 }
 
 impl Job<'_> {
@@ -150,7 +160,10 @@ impl Job<'_> {
         let pixels = (last - first) * width;
         // Rows that the windows reach.
         let (above, below) = (first.saturating_sub(R), (last + R).min(height));
-        let gray = &self.reference.gray[above * width..below * width];
+        let steps = gray_steps(R);
+        let gray = in_steps(&self.reference.gray[above * width..below * width], steps);
+        let gray: Vec<i32> = gray.iter().map(|&gray| gray as i32).collect();
+        let noise = self.config.noise_var * steps * steps;
         let span = |y: usize| {
             (y.saturating_sub(R) - above) * width..((y + R + 1).min(height) - above) * width
         };
@@ -160,13 +173,11 @@ impl Job<'_> {
             Padded::new(width),
             Padded::new(width),
         ];
-        // Per pixel: 1 / window size, mean of the reference, 1 / sqrt(variance sum with noise).
-        let (mut per_count, mut ref_sum, mut ref_scale) = (
-            vec![0.0f32; pixels],
-            vec![0.0f32; pixels],
-            vec![0.0f32; pixels],
-        );
-        let squares: Vec<f32> = gray.iter().map(|v| v * v).collect();
+        // Per pixel: the size of its window, the reference's mean there, 1 / sqrt(variance sum with noise) in steps of a score.
+        let mut counts = vec![Count::default(); pixels];
+        let mut levels = vec![Level::default(); pixels];
+        let mut scales = vec![0.0f32; pixels];
+        let squares: Vec<i32> = gray.iter().map(|v| v * v).collect();
         for y in first..last {
             let at = (y - first) * width;
             column[0].sum_rows(&gray[span(y)], width);
@@ -174,33 +185,31 @@ impl Job<'_> {
             let rows = span(y).len() / width;
             for x in 0..width {
                 let columns = (x + R + 1).min(width) - x.saturating_sub(R);
-                let count = (rows * columns) as f32;
-                let (sum, sum_of_squares) = (column[0].window(x), column[1].window(x));
-                let variance =
-                    (sum_of_squares - sum * sum / count).max(0.0) + self.config.noise_var * count;
-                per_count[at + x] = 1.0 / count;
-                ref_sum[at + x] = sum;
-                ref_scale[at + x] = 1.0 / variance.sqrt();
+                let count = Count::new(rows * columns);
+                let level = Level::new(column[0].window(x), count);
+                let variance = level.variance(column[1].window(x), count) + count.times(noise);
+                counts[at + x] = count;
+                levels[at + x] = level;
+                scales[at + x] = SCORE_STEPS / variance.sqrt();
             }
         }
 
         let reach = (below - above) * width;
-        let (mut warped, mut warped_squares, mut products) = (
-            vec![0.0f32; reach],
-            vec![0.0f32; reach],
-            vec![0.0f32; reach],
-        );
+        let (mut warped, mut warped_squares, mut products) =
+            (vec![0i32; reach], vec![0i32; reach], vec![0i32; reach]);
         let mut seen = vec![0.0f32; reach];
-        let most = ((self.sources.len() as f32 * self.config.best).ceil() as usize)
-            .clamp(1, self.sources.len().max(1));
+        let most = ((self.pictures.len() as f32 * self.config.best).ceil() as usize)
+            .clamp(1, self.pictures.len().max(1));
         let mut best = vec![UNSEEN; most * pixels];
         let mut count = vec![0.0f32; pixels];
         let mut block = vec![1.0f32; BLOCK * pixels];
+        let spacing = Spacing::of(self.offsets);
         for (block_index, offsets) in self.offsets.chunks(BLOCK).enumerate() {
-            for (plane, &offset) in offsets.iter().enumerate() {
+            for plane in 0..offsets.len() {
+                let offset = spacing.at((block_index * BLOCK + plane) as f32);
                 best.fill(UNSEEN);
                 count.fill(0.0);
-                for (source, warp) in self.sources.iter().zip(self.warps) {
+                for (source, warp) in self.pictures.iter().zip(self.warps) {
                     for y in above..below {
                         let row = (y - above) * width..(y - above + 1) * width;
                         let base = self.base.map(|base| &base[y * width..(y + 1) * width]);
@@ -228,13 +237,12 @@ impl Job<'_> {
                         let at = (y - first) * width;
                         let here = at..at + width;
                         let seen = &seen[(y - above) * width..(y - above + 1) * width];
-                        let (per_count, ref_sum, ref_scale) = (
-                            &per_count[here.clone()],
-                            &ref_sum[here.clone()],
-                            &ref_scale[here.clone()],
+                        let (counts, levels, scales) = (
+                            &counts[here.clone()],
+                            &levels[here.clone()],
+                            &scales[here.clone()],
                         );
                         let count = &mut count[here];
-                        let noise = self.config.noise_var;
                         let mut score = [0.0f32; 64];
                         for from in (0..width).step_by(64) {
                             let n = (width - from).min(64);
@@ -245,11 +253,16 @@ impl Job<'_> {
                                     column[1].window(x),
                                     column[2].window(x),
                                 );
-                                let covariance = rs - s * ref_sum[x] * per_count[x];
-                                let variance =
-                                    (ss - s * s * per_count[x]).max(0.0) + noise / per_count[x];
-                                let correlation = covariance * ref_scale[x] / variance.sqrt();
-                                *score = if seen[x] > 0.0 { correlation } else { UNSEEN };
+                                let n = counts[x];
+                                let level = Level::new(s, n);
+                                let covariance = level.covariance(levels[x], rs, n);
+                                let variance = level.variance(ss, n) + n.times(noise);
+                                let correlation = covariance * scales[x] / variance.sqrt();
+                                *score = if seen[x] > 0.0 {
+                                    round(correlation)
+                                } else {
+                                    UNSEEN
+                                };
                                 count[x] += seen[x];
                             }
                             // Keeps the best in order: each pushes the lesser one down.
@@ -283,7 +296,8 @@ impl Job<'_> {
                 for (cost, &count) in block.iter_mut().zip(&count) {
                     let counted = (count * self.config.best).ceil();
                     *cost = if count > 0.0 {
-                        1.0 - *cost / counted
+                        let mean = *cost / counted * (1.0 / SCORE_STEPS);
+                        round((1.0 - mean) * COST_STEPS) * (1.0 / COST_STEPS)
                     } else {
                         1.0
                     };
@@ -304,22 +318,22 @@ impl Job<'_> {
 /// nearest pixel of its border stands in.
 #[inline(always)]
 fn warp_row(
-    source: &View,
+    source: &Picture,
     warp: &Warp,
     y: usize,
     base: Option<&[f32]>,
     offset: f32,
-    out: &mut [f32],
+    out: &mut [i32],
     seen: &mut [f32],
 ) {
     let width = out.len();
-    let (columns, rows) = source.size();
+    let (columns, rows) = source.size;
     // A hair inside, so that the right and lower neighbour exist.
     let (last_u, last_v) = (columns as f32 - 1.001, rows as f32 - 1.001);
     let Warp { a, b } = warp;
     let y = y as f32;
     let start = [a[1] * y + a[2], a[4] * y + a[5], a[7] * y + a[8]];
-    let gray = &source.gray[..columns * rows];
+    let gray = &source.steps[..columns * rows];
     let (mut at, mut fu, mut fv) = ([0u32; 64], [0.0f32; 64], [0.0f32; 64]);
     for from in (0..width).step_by(64) {
         let n = (width - from).min(64);
@@ -334,13 +348,20 @@ fn warp_row(
         for i in 0..64 {
             let (x, rho) = ((from as i32 + i as i32) as f32, rhos[i]);
             let z = a[6] * x + start[2] + b[2] * rho;
-            let inv = 1.0 / z;
-            let u = (a[0] * x + start[0] + b[0] * rho) * inv;
-            let v = (a[3] * x + start[1] + b[1] * rho) * inv;
+            let (u, v) = (
+                a[0] * x + start[0] + b[0] * rho,
+                a[3] * x + start[1] + b[1] * rho,
+            );
+            // 0 <= u / z <= last with z > 0, without the division.
+            let room = u.min(last_u * z - u).min(v).min(last_v * z - v);
+            inside[i] = if room.min(z - LEAST_Z) >= 0.0 {
+                1.0
+            } else {
+                0.0
+            };
+            let inv = 1.0 / z.max(LEAST_Z);
+            let (u, v) = (u * inv, v * inv);
             let (cu, cv) = (u.max(0.0).min(last_u), v.max(0.0).min(last_v));
-            // Inside is what no clamp moved.
-            let is = (z > 1e-6) & (u == cu) & (v == cv);
-            inside[i] = if is { 1.0 } else { 0.0 };
             // SAFETY: clamped to the picture just now, NaN included (max gives 0).
             let (iu, iv): (i32, i32) = unsafe { (cu.to_int_unchecked(), cv.to_int_unchecked()) };
             fu[i] = cu - iu as f32;
@@ -361,7 +382,9 @@ fn warp_row(
             };
             let top = p + (q - p) * fu[i];
             let bottom = r + (s - r) * fu[i];
-            *out = top + (bottom - top) * fv[i];
+            let sample = round(top + (bottom - top) * fv[i]);
+            // SAFETY: between samples of a picture, some thousands of steps at most.
+            *out = unsafe { sample.to_int_unchecked() };
         }
     }
 }

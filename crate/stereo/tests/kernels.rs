@@ -180,7 +180,8 @@ async fn on_device(
     raw.await.expect("maps")
 }
 
-/// At most one pixel in a thousand may differ: where two planes are equally good, rounding decides.
+/// Where a driver multiplies and adds in one, samples differ by a step now and then, and where two planes are equally good, that decides: one pixel in a
+/// thousand, and the margin of two. A driver that does neither gives the very same numbers.
 fn assert_same(fused: &Raw, host: &Raw) {
     let pixels = host.rho.len();
     let differing = |a: &[f32], b: &[f32], within: &dyn Fn(f32) -> f32| {
@@ -194,7 +195,7 @@ fn assert_same(fused: &Raw, host: &Raw) {
     println!("of {pixels} pixels differ in inverse depth {rho}, score {zncc}, margin {unique}");
     assert!(rho * 1000 <= pixels, "{rho} inverse depths differ");
     assert!(zncc * 1000 <= pixels, "{zncc} scores differ");
-    assert!(unique * 1000 <= pixels, "{unique} margins differ");
+    assert!(unique * 500 <= pixels, "{unique} margins differ");
 }
 
 on_gpu! {

@@ -9,15 +9,13 @@ use net::Level;
 use scan::Scan;
 use stereo::{StereoConfig, sources};
 
-/// How fast the devices are.
+/// How fast the device is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rates {
-    /// Lattice points a second that the volume's device fuses a view into.
+    /// Lattice points a second that it fuses a view into.
     pub fusing: f64,
-    /// Operations a second of the volume's device, which makes stereo's depth, too.
-    pub volume: f64,
-    /// Operations a second of the network's device, which makes the network's guide, too. It may be the same.
-    pub network: f64,
+    /// Operations a second.
+    pub arithmetic: f64,
 }
 
 /// What a run has to do. An operation is a multiplication or an addition, or what takes as long.
@@ -25,10 +23,8 @@ pub struct Rates {
 pub struct Work {
     /// Lattice points of the volume that views are fused into; those whose surface is made count more.
     pub fusing: f64,
-    /// Operations on the volume's device: stereo where that is the source of depth.
-    pub volume: f64,
-    /// Operations on the network's device: the network and its guide.
-    pub network: f64,
+    /// Operations of stereo, or of the network and its guide.
+    pub operations: f64,
     /// Pixels of files that are decoded.
     pub decoded_pixels: f64,
 }
@@ -94,18 +90,16 @@ impl Work {
             },
             DepthSource::Stereo(config) => Self {
                 fusing,
-                volume: matching(config, scope),
+                operations: matching(config, scope),
                 // For matching, and for their colours.
                 decoded_pixels: 2.0 * keyframes * color,
-                ..Self::default()
             },
             DepthSource::Network(config) => Self {
                 // The surface of each level, before colours and after.
                 fusing: 2.0 * bricks * points * SURFACE,
-                network: matching(&StereoConfig::default(), scope) + thinking(config, scope),
+                operations: matching(&StereoConfig::default(), scope) + thinking(config, scope),
                 // For their features, for the guide, and for their colours.
                 decoded_pixels: 3.0 * keyframes * color,
-                ..Self::default()
             },
         }
     }
@@ -113,8 +107,7 @@ impl Work {
     /// Seconds it takes.
     pub fn seconds(&self, rates: &Rates) -> f64 {
         self.fusing / rates.fusing
-            + self.volume / rates.volume
-            + self.network / rates.network
+            + self.operations / rates.arithmetic
             + self.decoded_pixels * DECODE_S
     }
 }

@@ -1,15 +1,6 @@
-//! Two numbers in one: grey values, scores and costs cross memory with 16 bits each, which is what bounds the kernels.
+//! Two numbers in one: grey values, scores and costs are whole steps ([`crate::window`]) and cross memory with 16 bits each, which is what bounds the kernels.
 
 use cubecl::prelude::*;
-
-/// Steps of a grey level in a packed sample.
-pub(super) const GRAY_STEPS: f32 = 256.0;
-
-/// Steps of a unit of ZNCC in a packed score.
-pub(super) const SCORE_STEPS: f32 = 30_000.0;
-
-/// Steps of a unit of cost in a packed cost; costs lie from 0 to 2.
-pub(super) const COST_STEPS: f32 = 15_000.0;
 
 /// 1.5 * 2^23: between 2^23 and 2^24 floats are whole numbers, and their last bits are those of the summand, rounded.
 const ROUND: f32 = 12_582_912.0;
@@ -25,11 +16,23 @@ pub(super) fn pack(low: f32, high: f32) -> i32 {
 /// The first of two packed numbers.
 #[cube]
 pub(super) fn low(pair: i32) -> f32 {
-    ((pair << 16i32) >> 16i32) as f32
+    low_steps(pair) as f32
 }
 
 /// The second of two packed numbers.
 #[cube]
 pub(super) fn high(pair: i32) -> f32 {
-    (pair >> 16i32) as f32
+    high_steps(pair) as f32
+}
+
+/// The first as a whole number.
+#[cube]
+pub(super) fn low_steps(pair: i32) -> i32 {
+    (pair << 16i32) >> 16i32
+}
+
+/// The second as a whole number.
+#[cube]
+pub(super) fn high_steps(pair: i32) -> i32 {
+    pair >> 16i32
 }

@@ -1,12 +1,7 @@
 //! Pictures on the device. A view is a source of a dozen keyframes, so sources stay there until their place is needed.
 
-use super::{
-    float_buffer, int_buffer,
-    pack::{GRAY_STEPS, pack},
-    shape::BINDING_BYTES,
-    sweep::THREADS,
-};
-use crate::{StereoError, view::View};
+use super::{float_buffer, int_buffer, pack::pack, shape::BINDING_BYTES, sweep::THREADS};
+use crate::{StereoError, view::View, window::in_steps};
 use burn::{
     Tensor,
     tensor::{DType, Device, TensorData},
@@ -17,9 +12,6 @@ use cubecl::prelude::*;
 /// Sources kept, unless more are asked for at once.
 const KEPT: usize = 32;
 
-/// The middle of the grey scale: sums of squares lose least around it.
-const CENTER: f32 = 128.0;
-
 /// Source pictures in places of equal size in one buffer.
 #[derive(Debug)]
 pub(super) struct Pictures {
@@ -27,6 +19,8 @@ pub(super) struct Pictures {
     pub(super) buffer: CubeTensor,
     /// Pixels of a place.
     pub(super) slot: usize,
+    /// Steps of a grey level.
+    steps: f32,
     places: Vec<Place>,
     clock: u64,
 }
@@ -38,22 +32,28 @@ struct Place {
 }
 
 impl Pictures {
-    /// Room for `count` sources of `slot` pixels and some more.
-    pub(super) fn new(device: &Device, slot: usize, count: usize) -> Result<Self, StereoError> {
+    /// Room for `count` sources of `slot` pixels and some more, with so many steps of a grey level.
+    pub(super) fn new(
+        device: &Device,
+        slot: usize,
+        count: usize,
+        steps: f32,
+    ) -> Result<Self, StereoError> {
         let most = BINDING_BYTES / (4 * slot.max(1));
         let places = KEPT.min(most).max(count);
         let empty = Tensor::empty([places * slot], (device, DType::I32));
         Ok(Self {
             buffer: int_buffer(empty)?,
             slot,
+            steps,
             places: vec![Place::default(); places],
             clock: 0,
         })
     }
 
-    /// Whether `count` sources of `slot` pixels have room at once.
-    pub(super) fn fits(&self, slot: usize, count: usize) -> bool {
-        slot <= self.slot && count <= self.places.len()
+    /// Whether `count` sources of `slot` pixels have room at once, in these steps.
+    pub(super) fn fits(&self, slot: usize, count: usize, steps: f32) -> bool {
+        slot <= self.slot && count <= self.places.len() && steps == self.steps
     }
 
     /// The places of some sources; those that are not there yet are brought there.
@@ -82,7 +82,7 @@ impl Pictures {
         }
         let oldest = self.places.iter().enumerate().min_by_key(|(_, p)| p.used);
         let oldest = oldest.map_or(0, |(i, _)| i);
-        let gray = upload(device, view.gray.clone())?;
+        let gray = upload(device, in_steps(&view.gray, self.steps))?;
         let pixels = view.gray.len() as u32;
         // SAFETY: a place has room for the picture, and threads past its end stop at once.
         unsafe {
@@ -104,7 +104,7 @@ impl Pictures {
     }
 }
 
-/// A reference with a frame of zeros, `radius` pixels wide; each pixel with its right neighbour.
+/// A reference, in steps, with a frame of zeros, `radius` pixels wide; each pixel with its right neighbour.
 pub(super) fn framed(
     device: &Device,
     gray: &CubeTensor,
@@ -138,11 +138,6 @@ pub(super) fn upload(device: &Device, values: Vec<f32>) -> Result<CubeTensor, St
     float_buffer(Tensor::from_data(data, (device, DType::F32)))
 }
 
-#[cube]
-fn steps(gray: f32) -> f32 {
-    (gray - CENTER) * GRAY_STEPS
-}
-
 #[cube(launch_unchecked)]
 fn place_kernel(gray: &[f32], pictures: &mut [i32], pixels: u32, start: u32) {
     let at = CUBE_POS_X * THREADS + UNIT_POS_X;
@@ -150,7 +145,7 @@ fn place_kernel(gray: &[f32], pictures: &mut [i32], pixels: u32, start: u32) {
         terminate!();
     }
     let next = (at + 1).min(pixels - 1);
-    pictures[(start + at) as usize] = pack(steps(gray[at as usize]), steps(gray[next as usize]));
+    pictures[(start + at) as usize] = pack(gray[at as usize], gray[next as usize]);
 }
 
 /// The grey value of a pixel of the framed picture.
@@ -158,7 +153,7 @@ fn place_kernel(gray: &[f32], pictures: &mut [i32], pixels: u32, start: u32) {
 fn framed_steps(gray: &[f32], x: u32, y: u32, width: u32, height: u32, radius: u32) -> f32 {
     let mut value = 0.0f32;
     if x >= radius && y >= radius && x < width + radius && y < height + radius {
-        value = steps(gray[((y - radius) * width + x - radius) as usize]);
+        value = gray[((y - radius) * width + x - radius) as usize];
     }
     value
 }

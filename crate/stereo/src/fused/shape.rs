@@ -1,7 +1,7 @@
 //! The sizes of a keyframe's work, and what fits on a device.
 
 use super::smooth::{MOST_LANES, lanes};
-use crate::{StereoError, view::View};
+use crate::{StereoError, sweep::Spacing, view::View};
 
 /// The largest binding that WebGPU guarantees.
 pub(super) const BINDING_BYTES: usize = 128 << 20;
@@ -90,8 +90,10 @@ pub(super) fn shape(
             found,
         );
     }
-    let first_rho = offsets[0];
-    let step = (offsets[planes - 1] - first_rho) / (planes - 1).max(1) as f32;
+    let Spacing {
+        first: first_rho,
+        step,
+    } = Spacing::of(offsets);
     let even =
         |(i, rho): (usize, &f32)| (rho - first_rho - step * i as f32).abs() <= 0.01 * step.abs();
     if !offsets.iter().enumerate().all(even) {

@@ -6,9 +6,10 @@
 //! so that all lines of a direction have the same length.
 
 use super::{
-    pack::{COST_STEPS, high, low},
+    pack::{high, low},
     sweep::{Four, Packed},
 };
+use crate::window::COST_STEPS;
 use cubecl::prelude::*;
 
 /// Threads of a workgroup.
@@ -29,15 +30,15 @@ pub(super) fn lanes(planes: usize) -> usize {
 /// More than any cost along a path.
 const NEVER: f32 = 1e6;
 
-/// The eight directions (dx, dy) in which paths go.
+/// The eight directions (dx, dy) in which paths go, in the order in which [`crate::smooth`] adds them up.
 pub(super) const DIRECTIONS: [(i32, i32); 8] = [
     (1, 0),
     (-1, 0),
-    (0, 1),
     (1, 1),
+    (0, 1),
     (-1, 1),
-    (0, -1),
     (1, -1),
+    (0, -1),
     (-1, -1),
 ];
 

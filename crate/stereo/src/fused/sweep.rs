@@ -5,11 +5,15 @@
 //! all windows it falls into. A picture of samples has a frame of zeros as wide as a window reaches, so that windows
 //! need no borders: what lies outside adds nothing to any sum.
 
-use super::pack::{COST_STEPS, GRAY_STEPS, SCORE_STEPS, high, low, pack};
+use super::pack::{high, high_steps, low, low_steps, pack};
+use crate::window::{COST_STEPS, SCORE_STEPS};
 use cubecl::prelude::*;
 
 /// Two planes at a pixel.
 type Two = Vector<f32, Const<2>>;
+
+/// Whole numbers at two planes.
+type Whole = Vector<i32, Const<2>>;
 
 /// Four planes at a pixel.
 pub(super) type Four = Vector<f32, Const<4>>;
@@ -72,9 +76,9 @@ pub(super) fn warp_kernel(
     let stride = (CUBE_COUNT_Z * down * across) as usize;
     let w = source as usize * WARP;
     let xf = x as f32 - comptime!(radius as f32);
-    let ux = warps[w] * xf + warps[w + 2];
-    let vx = warps[w + 3] * xf + warps[w + 5];
-    let zx = warps[w + 6] * xf + warps[w + 8];
+    let ux = warps[w] * xf;
+    let vx = warps[w + 3] * xf;
+    let zx = warps[w + 6] * xf;
     let uy = warps[w + 1];
     let vy = warps[w + 4];
     let zy = warps[w + 7];
@@ -94,9 +98,9 @@ pub(super) fn warp_kernel(
                 from = base[((y - radius) * width + x - radius) as usize];
             }
             let yf = y as f32 - comptime!(radius as f32);
-            let u0 = ux + uy * yf;
-            let v0 = vx + vy * yf;
-            let z0 = zx + zy * yf;
+            let u0 = ux + (uy * yf + warps[w + 2]);
+            let v0 = vx + (vy * yf + warps[w + 5]);
+            let z0 = zx + (zy * yf + warps[w + 8]);
             let mut to = ((source * down + y) * across + x) as usize;
             for pair in 0..pairs {
                 let mut out = 0i32;
@@ -134,23 +138,36 @@ pub(super) fn warp_kernel(
 
 /// Pixels of a window along one axis of the picture.
 #[cube]
-fn window(x: u32, length: u32, #[comptime] radius: u32) -> f32 {
+fn window(x: u32, length: u32, #[comptime] radius: u32) -> u32 {
     let low = x - x.min(radius);
-    let high = (x + radius + 1).min(length);
-    (high - low) as f32
+    (x + radius + 1).min(length) - low
 }
 
 #[cube]
-fn unpack(pair: i32) -> Two {
-    let mut values = Two::new(low(pair));
-    values.insert(1usize, high(pair));
+fn unpack(pair: i32) -> Whole {
+    let mut values = Whole::new(low_steps(pair));
+    values.insert(1usize, high_steps(pair));
     values
+}
+
+/// The mean of so many steps, as a whole number.
+#[cube]
+fn mean(sum: i32, per: f32) -> i32 {
+    low_steps(pack(sum as f32 * per, 0.0f32))
+}
+
+/// The sum of squared deviations: [`crate::window::Level::variance`].
+#[cube]
+fn variance(sum: i32, mean: i32, squares: i32, count: i32, per: f32) -> f32 {
+    let beside = sum - count * mean;
+    let around = squares - mean * (sum + beside);
+    around as f32 - beside as f32 * beside as f32 * per
 }
 
 /// ZNCC of every window. A thread is `wide` columns, a segment of rows, a source and a pair of planes; it walks down the
 /// segment with the sums of the last `2 radius + 1` rows of its windows at hand.
 ///
-/// `gray`: the framed reference, each pixel with its right neighbour. `scores`: `[pairs, sources, height, width]`.
+/// `gray`: the framed reference, each pixel with its right neighbour. `noise`: its variance in squared steps. `scores`: `[pairs, sources, height, width]`.
 #[cube(launch_unchecked)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn window_kernel(
@@ -165,7 +182,7 @@ pub(super) fn window_kernel(
     first_pair: u32,
     first_rho: f32,
     step: f32,
-    noise_var: f32,
+    noise: f32,
     #[comptime] radius: u32,
     #[comptime] wide: usize,
     #[comptime] has_base: bool,
@@ -188,22 +205,19 @@ pub(super) fn window_kernel(
     let vy = warps[w + 4];
     let zx = warps[w + 6];
     let zy = warps[w + 7];
-    let u0 = ux * x as f32 + warps[w + 2];
-    let v0 = vx * x as f32 + warps[w + 5];
-    let z0 = zx * x as f32 + warps[w + 8];
     let bu = warps[w + 9];
     let bv = warps[w + 10];
     let bz = warps[w + 11];
     let most_x = warps[w + 12];
     let most_y = warps[w + 13];
-    let mut ring_s = Array::<Two>::new(comptime!(side * wide));
-    let mut ring_ss = Array::<Two>::new(comptime!(side * wide));
-    let mut ring_rs = Array::<Two>::new(comptime!(side * wide));
-    let mut ring_r = Array::<f32>::new(comptime!(side * wide));
-    let mut ring_rr = Array::<f32>::new(comptime!(side * wide));
+    let mut ring_s = Array::<Whole>::new(comptime!(side * wide));
+    let mut ring_ss = Array::<Whole>::new(comptime!(side * wide));
+    let mut ring_rs = Array::<Whole>::new(comptime!(side * wide));
+    let mut ring_r = Array::<i32>::new(comptime!(side * wide));
+    let mut ring_rr = Array::<i32>::new(comptime!(side * wide));
     let columns = comptime!(side + wide - 1);
-    let mut column_s = Array::<Two>::new(columns);
-    let mut column_r = Array::<f32>::new(comptime!(columns + 1));
+    let mut column_s = Array::<Whole>::new(columns);
+    let mut column_r = Array::<i32>::new(comptime!(columns + 1));
     let rounds = (end - top + 2 * radius).div_ceil(2 * radius + 1);
     let from = CUBE_POS_Z * across * down + x;
     let to = CUBE_POS_Z * width * height + x;
@@ -221,26 +235,26 @@ pub(super) fn window_kernel(
             #[unroll]
             for k in 0..comptime!(columns.div_ceil(2)) {
                 let two = gray[shade + comptime!(2 * k)];
-                column_r[comptime!(2 * k)] = low(two);
-                column_r[comptime!(2 * k + 1)] = high(two);
+                column_r[comptime!(2 * k)] = low_steps(two);
+                column_r[comptime!(2 * k + 1)] = high_steps(two);
             }
             #[unroll]
             for k in 0..columns {
                 column_s[k] = unpack(warped[line + k]);
             }
             // Sums over the columns that all windows of the thread have in common, then those that each has beside.
-            let mut s = Two::new(0.0f32);
-            let mut ss = Two::new(0.0f32);
-            let mut rs = Two::new(0.0f32);
-            let mut r = 0.0f32;
-            let mut rr = 0.0f32;
+            let mut s = Whole::new(0i32);
+            let mut ss = Whole::new(0i32);
+            let mut rs = Whole::new(0i32);
+            let mut r = 0i32;
+            let mut rr = 0i32;
             #[unroll]
             for k in comptime!(wide - 1)..side {
                 let v = column_s[k];
                 let g = column_r[k];
                 s += v;
                 ss += v * v;
-                rs += v * Two::new(g);
+                rs += v * Whole::new(g);
                 r += g;
                 rr += g * g;
             }
@@ -262,7 +276,7 @@ pub(super) fn window_kernel(
                     let g = column_r[beside];
                     own_s += v;
                     own_ss += v * v;
-                    own_rs += v * Two::new(g);
+                    own_rs += v * Whole::new(g);
                     own_r += g;
                     own_rr += g * g;
                 }
@@ -294,28 +308,39 @@ pub(super) fn window_kernel(
                     }
                     let own_x = x + comptime!(i as u32);
                     let n = rows * window(own_x.min(width - 1), width, radius);
-                    let per = 1.0f32 / n;
-                    let covariance = rs - s * Two::new(r * per);
-                    let noise = noise_var * (n * (GRAY_STEPS * GRAY_STEPS));
-                    let var_r = (rr - r * r * per).max(0.0f32) + noise;
-                    let var_s = ss - s * s * Two::new(per);
-                    let var_s = max(var_s, Two::new(0.0f32)) + Two::new(noise);
-                    let score = covariance * (Two::new(var_r) * var_s).inverse_sqrt();
+                    let count = n as i32;
+                    let per = 1.0f32 / n as f32;
+                    let window_noise = noise * n as f32;
+                    let mean_r = mean(r, per);
+                    let beside_r = r - count * mean_r;
+                    let var_r = variance(r, mean_r, rr, count, per) + window_noise;
+                    let scale = SCORE_STEPS / var_r.sqrt();
+                    let mut steps = Two::new(0.0f32);
+                    #[unroll]
+                    for p in 0..2usize {
+                        let sum = s.extract(p);
+                        let mean_s = mean(sum, per);
+                        let beside = sum - count * mean_s;
+                        let var_s = variance(sum, mean_s, ss.extract(p), count, per);
+                        let products = rs.extract(p) - mean_s * beside_r - mean_r * sum;
+                        let covariance = products as f32 - beside as f32 * beside_r as f32 * per;
+                        let deviation = (var_s + window_noise).sqrt();
+                        steps.insert(p, covariance * scale / deviation);
+                    }
                     let mut rho = planes;
                     if comptime!(has_base) {
                         let from = base[(y * width + own_x.min(width - 1)) as usize];
                         rho = max(planes + Two::new(from), Two::new(1e-3f32));
                     }
-                    let shift = comptime!(i as f32);
-                    let z = Two::new(z0 + zx * shift + zy * yf) + Two::new(bz) * rho;
-                    let u = Two::new(u0 + ux * shift + uy * yf) + Two::new(bu) * rho;
-                    let v = Two::new(v0 + vx * shift + vy * yf) + Two::new(bv) * rho;
+                    let xf = own_x as f32;
+                    let z = Two::new(zx * xf + (zy * yf + warps[w + 8])) + Two::new(bz) * rho;
+                    let u = Two::new(ux * xf + (uy * yf + warps[w + 2])) + Two::new(bu) * rho;
+                    let v = Two::new(vx * xf + (vy * yf + warps[w + 5])) + Two::new(bv) * rho;
                     // 0 <= u / z <= most with z > 0, without the division.
                     let room_x = min(u, Two::new(most_x) * z - u);
                     let room_y = min(v, Two::new(most_y) * z - v);
                     let room = min(min(room_x, room_y), z - Two::new(1e-6f32));
                     let sees = room.greater_equal(&Two::new(0.0f32));
-                    let steps = score * Two::new(SCORE_STEPS);
                     let out = select_many(sees, steps, Two::new(NONE));
                     if own_x < width {
                         scores[(to + y * width) as usize + i] =

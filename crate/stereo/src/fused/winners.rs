@@ -1,9 +1,10 @@
 //! The winning plane of every pixel as one kernel.
 
 use super::{
-    pack::{COST_STEPS, high, low},
+    pack::{high, low},
     sweep::{Four, THREADS},
 };
+use crate::window::COST_STEPS;
 use cubecl::prelude::*;
 
 /// A thread is a pixel. Writes inverse depth, ZNCC and uniqueness as three maps, one after the other: `[3, pixels]`.
