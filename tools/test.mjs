@@ -6,7 +6,7 @@ import { setup } from './setup.mjs';
 import { afterSecondTry, count, failures, reasons, sum } from './test/count.mjs';
 import { lanes } from './test/lanes.mjs';
 
-const limitSeconds = 2400;
+const limitSeconds = 3000;
 const verbose = process.argv.includes('--verbose');
 const named = process.argv.slice(2).filter((word) => !word.startsWith('--'));
 const unknown = named.filter((name) => !(name in lanes));

@@ -2,7 +2,7 @@
 import { execFile } from 'node:child_process';
 import { promisify } from 'node:util';
 import { join } from 'node:path';
-import { buildEnv, gpu } from '../../tools/env.mjs';
+import { buildEnv } from '../../tools/env.mjs';
 import { must, root } from '../../tools/run.mjs';
 
 const program = join(root, 'target/release/ipdrecon');
@@ -14,13 +14,11 @@ export const build = () => must('cargo', ['test', '--release', '--workspace', '-
 /** Fuses a scan into a mesh. */
 export const fuse = (scan, out) => execute(program, ['fuse', scan, '-o', out]);
 
-/** Depth from the photos of a scan, into a mesh. */
-export const stereo = (scan, out, { views, size, device = 'cpu' }) =>
-  execute(program, ['stereo', scan, '-o', out, '--views', String(views), '--size', size, '--device', device], { env: gpu(buildEnv()) });
+/** Depth from the photos of a scan, into a mesh; on the processor, as the next. */
+export const stereo = (scan, out, { views, size }) => execute(program, ['stereo', scan, '-o', out, '--views', String(views), '--size', size]);
 
 /** The network's surface from the photos of a scan, into a mesh. */
-export const reconstruct = (scan, out, { keyframes, device = 'cpu' }) =>
-  execute(program, ['reconstruct', scan, '-o', out, '--preset', 'small', '--keyframes', String(keyframes), '--device', device], { env: gpu(buildEnv()) });
+export const reconstruct = (scan, out, { keyframes }) => execute(program, ['reconstruct', scan, '-o', out, '--preset', 'small', '--keyframes', String(keyframes)]);
 
 /** Writes the sample room as a folder of files. */
 export const sampleFolder = (folder) => execute(join(root, 'target/release/examples/sample_folder'), [folder]);

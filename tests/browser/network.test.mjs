@@ -29,7 +29,8 @@ after(async () => {
   await browser.close();
 });
 
-for (const [device, FIRST_S, WHOLE_S] of [['auto', 60, 360], ['cpu', 120, 600]]) {
+// `gpu` has a software adapter do everything, which is slower than what it is given by itself (`auto`); on a real one they are the same.
+for (const [device, FIRST_S, WHOLE_S] of [['auto', 60, 360], ['cpu', 120, 600], ['gpu', 180, 360]]) {
   test(`a real scan, photos alone: in time, coarse first, and as on the command line; device ${device}`, async (t) => {
     const path = join(root, '../shared/scans/hololens/scan');
     if (!existsSync(path)) {
@@ -88,17 +89,15 @@ test('the network and its guide on WebGPU itself, even where that is software, m
   assert.deepEqual(visitor.errors, []);
   await visitor.close();
   const own = join(out, 'gpu-command-line.ply');
-  await reconstruct(photos, own, { keyframes: 8, device: 'gpu' });
+  await reconstruct(photos, own, { keyframes: 8 });
   const apart = chamfer(vertices(readFileSync(ply)), vertices(readFileSync(own)));
   const sensor = join(out, 'sample-sensor.ply');
   await fuse(join(out, 'sample-room'), sensor);
   const f = [];
   for (const mesh of [ply, own]) f.push((await judge(mesh, sensor, 'plain')).surface.f_score);
-  t.diagnostic(`sample room on ${ready.adapter}, 8 views: ${finished.elapsedS.toFixed(1)} s; chamfer to the command line on Vulkan ${(apart * 1000).toFixed(2)} mm, F ${f.map((f) => f.toFixed(4)).join(' and ')}`);
-  // The network's own kernels differ by nothing that shows. Stereo's matching on two drivers prefers other planes in a few pixels of a
-  // hundred, and the network, which has them as its guide, makes millimetres of it.
-  assert.ok(apart <= 0.01, `chamfer ${apart} m`);
-  assert.ok(Math.abs(f[0] - f[1]) <= 0.02, `F ${f}`);
+  t.diagnostic(`sample room on ${ready.adapter}, 8 views: ${finished.elapsedS.toFixed(1)} s; chamfer to the command line on the processor ${(apart * 1000).toFixed(4)} mm, F ${f.map((f) => f.toFixed(4)).join(' and ')}`);
+  assert.ok(apart <= CHAMFER_M, `chamfer ${apart} m`);
+  assert.ok(Math.abs(f[0] - f[1]) <= SAME_F, `F ${f}`);
 });
 
 /** A page with the photos of the sample room, or others, planned; what it asks of the site on the way is counted. */
