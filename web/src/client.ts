@@ -83,7 +83,7 @@ const SURVIVED: ReadonlySet<string> = new Set(["scan", "weights", "export"]);
 /** The sample room that is shown unless another is asked for. */
 export const SAMPLE_SEED = 3;
 
-/** One engine in one worker: opens a scan, runs it, exports its mesh. */
+/** One engine: opens a scan, runs it, exports its mesh. Its worker starts another for the run where the processor computes. */
 export class Reconstructor extends EventTarget {
   /** Settles when the engine is up, or could not be started. */
   readonly ready: Promise<EventOf<"ready">>;

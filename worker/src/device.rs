@@ -59,6 +59,11 @@ impl Found {
     fn adapter(device: Device, setup: WgpuSetup, choice: DeviceChoice) -> Self {
         let info = setup.adapter.get_info();
         let words = format!("{} {}", info.name, info.driver);
+        // A browser may keep the name to itself.
+        let words = match words.trim() {
+            "" => "an adapter without a name",
+            words => words,
+        };
         let lower = words.to_lowercase();
         let is_software = SOFTWARE.iter().any(|name| lower.contains(name))
             || info.device_type == wgpu::DeviceType::Cpu;
@@ -74,7 +79,7 @@ impl Found {
             return Self {
                 gpu,
                 ready: on_processor(
-                    &format!("; drawn by {}", words.trim()),
+                    &format!("; drawn by {words}"),
                     "This graphics adapter is software: it draws, and the processor does the work, which takes longer",
                 ),
                 ..Self::processor("", "")
@@ -89,7 +94,7 @@ impl Found {
             gpu,
             ready: Event::Ready {
                 device: "webgpu".to_owned(),
-                adapter: words.trim().to_owned(),
+                adapter: words.to_owned(),
                 note: None,
             },
         }

@@ -95,7 +95,7 @@ impl Handle {
     }
 
     /// Whether it computes. Where the processor does, the worker that has the canvas only draws, and an engine in another worker, which
-    /// is given everything but what [`Handle::draws`] names, computes.
+    /// is given all requests but those about the view, computes.
     #[wasm_bindgen(getter)]
     pub fn computes(&self) -> bool {
         self.engine.is_some()
