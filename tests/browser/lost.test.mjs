@@ -36,13 +36,13 @@ const LOSABLE = `{
 }
 `;
 
-async function open(path) {
+async function open(path, state = 'idle') {
   const before = (page) => page.context().route('**/worker.js', async (route) => {
     const answer = await route.fetch();
     await route.fulfill({ response: answer, body: LOSABLE + await answer.text() });
   });
   const visitor = await browser.open({ path, before });
-  await visitor.until('idle');
+  await visitor.until(state);
   return visitor;
 }
 
@@ -77,6 +77,24 @@ test('the network goes on after the last finished stage, and makes the same mesh
   const distance_m = chamfer(vertices(readFileSync(await save(visitor, join(out, 'resumed.ply')))), straight);
   t.diagnostic(`lost in the finest level: then ${again.join(', ')}; chamfer to a straight run ${(distance_m * 1000).toFixed(4)} mm`);
   assert.ok(distance_m < 1e-4);
+  await visitor.close();
+});
+
+test('a run that was held is held again by the engine that takes over', async () => {
+  const visitor = await open('?sample&autostart=0&device=gpu', 'planned');
+  await visitor.page.click('#run');
+  await visitor.event('bricks');
+  await visitor.page.click('#pause');
+  await visitor.until('paused');
+  await visitor.forget();
+  await lose(visitor);
+  await visitor.event('paused');
+  await visitor.until('paused');
+  assert.equal((await losses(visitor)).length, 1);
+  assert.deepEqual(await visitor.events('finished'), []);
+  await visitor.page.click('#pause');
+  await visitor.until('finished');
+  assert.deepEqual(visitor.errors, []);
   await visitor.close();
 });
 

@@ -2,11 +2,14 @@
 import type { Event as EngineEvent, RunOptions, StageName } from "./engine.js";
 import type { ToWorker } from "./worker.js";
 
+const PAUSE: ToWorker = { request: { type: "pause" } };
+
 export class Work {
   #weights?: ToWorker;
   #opening?: ToWorker;
   #running?: { message: ToWorker; options: string };
   readonly #kept = new Map<StageName, File>();
+  #held = false;
 
   /** Remembers a message to the engine. What stages made is good for one scan, one set of options and one network. */
   asked(message: ToWorker): void {
@@ -35,6 +38,8 @@ export class Work {
   told(event: EngineEvent, payload?: Uint8Array<ArrayBuffer>): void {
     if (event.type === "kept" && payload) this.#kept.set(event.stage, new File([payload], event.stage));
     if (event.type === "finished" && event.cancelled) this.#running = undefined;
+    if (event.type === "paused") this.#held = true;
+    if (event.type === "resumed" || event.type === "finished") this.#held = false;
   }
 
   /** The messages after which another engine has the same scan open; none without a scan. */
@@ -42,11 +47,11 @@ export class Work {
     return this.#opening ? [...(this.#weights ? [this.#weights] : []), this.#opening] : [];
   }
 
-  /** The messages after which it goes on where this one was, once the scan is open; none where nothing ran. */
+  /** The messages after which it goes on where this one was, or waits there if this one did, once the scan is open; none where nothing ran. */
   get toRun(): ToWorker[] {
     if (!this.#running) return [];
     const kept = [...this.#kept].map(([stage, file]): ToWorker => ({ request: { type: "keep", stage }, files: [file] }));
-    return [...kept, this.#running.message];
+    return [...kept, this.#running.message, ...(this.#held ? [PAUSE] : [])];
   }
 }
 
