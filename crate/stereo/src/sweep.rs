@@ -3,7 +3,7 @@
 //! The hypothesis of pixel `p` on plane `d` is the inverse depth `rho = base(p) + offset[d]`. A source view is sampled
 //! there bilinearly and compared by zero-mean normalised cross-correlation over a square window, with the noise of a camera
 //! added to both variances: exposure and white balance cancel out, and blank walls match nothing rather than everything. The sums
-//! are exact ([`crate::window`]).
+//! are exact (`window.rs`).
 //! Of the sources that see the point the best share counts, since some are occluded (Kang, Szeliski and Chai 2001).
 
 use crate::{
