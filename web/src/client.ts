@@ -18,7 +18,7 @@ import type {
 } from "./engine.js";
 import { Deferred } from "./deferred.js";
 import { Work } from "./work.js";
-import type { FromWorker, ToWorker } from "./worker.js";
+import type { FromWorker, ToWorker } from "./channel.js";
 
 /** One of the engine's events by its name. */
 export type EventOf<K extends EngineEvent["type"]> = Extract<EngineEvent, { type: K }>;

@@ -1,6 +1,6 @@
 /** What an engine was asked for and what its finished stages made: all that another engine needs to go on. */
 import type { Event as EngineEvent, RunOptions, StageName } from "./engine.js";
-import type { ToWorker } from "./worker.js";
+import type { ToWorker } from "./channel.js";
 
 const PAUSE: ToWorker = { request: { type: "pause" } };
 

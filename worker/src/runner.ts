@@ -2,14 +2,8 @@
  * The engine's work in a worker of its own, where the processor does it: a step may take seconds, and the view answers the hand all the
  * while. The bricks come as bytes and are drawn by the worker that has the canvas.
  */
+import type { FromRunner, FromWorker, ToRunner, ToWorker } from "./channel.js";
 import type { Drawing, Engine, Request } from "./engine.js";
-import type { FromWorker, ToWorker } from "./worker.js";
-
-/** To the run's worker: what the page asks for, with the compiled engine beside the first, or where the visitor stands. */
-export type ToRunner = (ToWorker & { module?: WebAssembly.Module }) | { eye: readonly [number, number, number] };
-
-/** From the run's worker: what the page is told, or what is to be drawn. */
-export type FromRunner = FromWorker | { drawing: Drawing; vertices?: Float32Array<ArrayBuffer> };
 
 /** How long after a movement the run is told of it. */
 const LOOK_MS = 100;

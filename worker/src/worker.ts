@@ -3,26 +3,12 @@
  * is up, and it turns a crash of the engine into one sentence for the visitor instead of a page that stands still. Where the processor
  * computes, it draws alone and starts the same script once more as a {@link Runner}.
  */
+import type { FromRunner, FromWorker, ToRunner, ToWorker } from "./channel.js";
 import init, { Engine } from "./engine.js";
 import type { Drawing, Event, Request } from "./engine.js";
 import { download, missing, type Progress } from "./download.js";
 import { released } from "./released.js";
-import { Runner, type FromRunner, type ToRunner } from "./runner.js";
-
-/** From the page to the worker: a request, and the binary things that travel beside it. */
-export interface ToWorker {
-  request: Request;
-  /** Beside `start`; without it the engine computes and shows nothing. */
-  canvas?: OffscreenCanvas;
-  /** Beside `openFolder` (one for each path, in the same order), `openZip` and `useWeights`. */
-  files?: File[];
-}
-
-/** From the worker to the page: an event, and the bytes of an exported file beside it. */
-export interface FromWorker {
-  event: Event;
-  payload?: Uint8Array<ArrayBuffer>;
-}
+import { Runner } from "./runner.js";
 
 const scope = self as unknown as DedicatedWorkerGlobalScope;
 const waiting: ToWorker[] = [];

@@ -9,6 +9,7 @@ mod pictures;
 mod shape;
 mod smooth;
 mod sweep;
+mod window;
 mod winners;
 mod work;
 

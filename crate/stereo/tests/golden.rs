@@ -135,10 +135,11 @@ fn assert_near(what: &str, found: &[f32], expected: &[f32], tolerance: (f32, f32
     );
 }
 
-fn assert_maps(what: &str, found: &Raw, expected: &Value) {
+/// `share` of the pixels must be near.
+fn assert_maps(what: &str, found: &Raw, expected: &Value, share: f64) {
     let check = |name: &str, found: &[f32], tolerance| {
         let what = format!("{what}, {name}");
-        assert_near(&what, found, &floats(&expected[name]), tolerance, 0.995);
+        assert_near(&what, found, &floats(&expected[name]), tolerance, share);
     };
     check("rho", &found.rho, (0.0, 1e-3));
     check("zncc", &found.zncc, (1e-3, 0.0));
@@ -171,7 +172,7 @@ fn on_host(golden: &Value, name: &str, base: Option<&[f32]>, offsets: &[f32]) ->
     check("cost", &cost, 1e-3);
     check("sum", &sum, 8e-3);
     let raw = winners(&cost, &sum, base, offsets);
-    assert_maps(&format!("{name} on the host"), &raw, expected);
+    assert_maps(&format!("{name} on the host"), &raw, expected, 0.995);
     raw
 }
 
@@ -196,7 +197,7 @@ fn both_sweeps_on_the_host() {
     on_host(&golden, "fine", Some(&base), &fine_offsets(settings));
 }
 
-/// The kernels keep 16 bits of a number between two of them.
+/// A driver that multiplies and adds in one has other samples now and then, by a step, which shows where the picture is blank.
 #[test]
 fn both_sweeps_as_kernels() {
     let Some(device) = Device::wgpu_options().init().ok() else {
@@ -222,7 +223,7 @@ fn both_sweeps_as_kernels() {
         let smooth = smooth_config(&settings[format!("{fine}smooth")]);
         let raw = matcher.match_view(&views[0], &sources, base, &offsets, &sweep, &smooth);
         let raw = pollster::block_on(raw).expect("maps");
-        assert_maps(&format!("{name} as kernels"), &raw, &golden[name]);
+        assert_maps(&format!("{name} as kernels"), &raw, &golden[name], 0.99);
     }
 }
 

@@ -5,7 +5,10 @@
 //! all windows it falls into. A picture of samples has a frame of zeros as wide as a window reaches, so that windows
 //! need no borders: what lies outside adds nothing to any sum.
 
-use super::pack::{high, high_steps, low, low_steps, pack};
+use super::{
+    pack::{high, high_steps, low, low_steps, pack},
+    window::{mean, variance, window},
+};
 use crate::window::{COST_STEPS, SCORE_STEPS};
 use cubecl::prelude::*;
 
@@ -136,32 +139,11 @@ pub(super) fn warp_kernel(
     }
 }
 
-/// Pixels of a window along one axis of the picture.
-#[cube]
-fn window(x: u32, length: u32, #[comptime] radius: u32) -> u32 {
-    let low = x - x.min(radius);
-    (x + radius + 1).min(length) - low
-}
-
 #[cube]
 fn unpack(pair: i32) -> Whole {
     let mut values = Whole::new(low_steps(pair));
     values.insert(1usize, high_steps(pair));
     values
-}
-
-/// The mean of so many steps, as a whole number.
-#[cube]
-fn mean(sum: i32, per: f32) -> i32 {
-    low_steps(pack(sum as f32 * per, 0.0f32))
-}
-
-/// The sum of squared deviations: [`crate::window::Level::variance`].
-#[cube]
-fn variance(sum: i32, mean: i32, squares: i32, count: i32, per: f32) -> f32 {
-    let beside = sum - count * mean;
-    let around = squares - mean * (sum + beside);
-    around as f32 - beside as f32 * beside as f32 * per
 }
 
 /// ZNCC of every window. A thread is `wide` columns, a segment of rows, a source and a pair of planes; it walks down the
