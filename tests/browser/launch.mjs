@@ -5,6 +5,7 @@ import { join } from 'node:path';
 import { launch } from '../../tools/browser.mjs';
 import { root, toolsDir } from '../../tools/run.mjs';
 import { serve } from '../../tools/serve.mjs';
+import { assertSmooth, mark, MARK, Trace } from './tasks.mjs';
 
 /** Where pictures of the page are put, for people to look at. */
 export const pictures = join(toolsDir, 'pictures');
@@ -30,20 +31,25 @@ function record(types) {
 export async function visit({ device = 'auto', ...options } = {}) {
   const site = await serve(join(root, 'www/dist'), 0);
   const browser = await launch(options);
+  let trace;
   return {
     url: site.url,
-    /** A page in a window of its own, opened at `path`. */
-    async open({ path = '', width = 1280, height = 800, scheme = 'light', before } = {}) {
+    /** A page in a window of its own, opened at `path`; `traced` if {@link Visitor.isSmooth} is to be asked. */
+    async open({ path = '', width = 1280, height = 800, scheme = 'light', before, traced = false } = {}) {
       const context = await browser.newContext({ viewport: { width, height }, colorScheme: scheme, acceptDownloads: true });
       const page = await context.newPage();
       const errors = [];
       page.on('pageerror', (error) => errors.push(error.message));
       await page.addInitScript(record, events);
+      // One that a failed test has left open ends here.
+      await trace?.end();
+      trace = traced ? await Trace.start(browser) : undefined;
+      if (traced) await page.addInitScript(mark, MARK);
       await before?.(page);
       const address = new URL(path, site.url);
       if (device !== 'auto' && !address.searchParams.has('device')) address.searchParams.set('device', device);
       await page.goto(address.href);
-      return new Visitor(page, errors);
+      return new Visitor(page, errors, trace);
     },
     async close() {
       await browser.close();
@@ -54,8 +60,11 @@ export async function visit({ device = 'auto', ...options } = {}) {
 
 /** One open page. */
 export class Visitor {
-  constructor(page, errors) {
+  #trace;
+
+  constructor(page, errors, trace) {
     this.page = page;
+    this.#trace = trace;
     /** What no code of the page has caught. */
     this.errors = errors;
   }
@@ -70,10 +79,11 @@ export class Visitor {
     return this.page.evaluate(() => window.record.longTasks);
   }
 
-  /** In a journey too long to be made again: no long task but for one that a busy machine stretched. */
+  /** Ends the trace of a page opened with `traced`: no task since {@link Visitor.forget} kept the page's thread from the visitor. */
   async isSmooth() {
-    const tasks = await this.longTasks();
-    assert.ok(tasks.length <= 1 && tasks.every(({ duration }) => duration < 100), `long tasks: ${JSON.stringify(tasks)}`);
+    await this.#trace.end();
+    const [long, elapsed_ms] = await this.page.evaluate(() => [window.record.longTasks, performance.now() - (window.record.from_ms ?? 0)]);
+    return assertSmooth(this.#trace.worked_ms(), long, elapsed_ms);
   }
 
   state() {
@@ -104,8 +114,15 @@ export class Visitor {
   }
 
   /** Forgets what was recorded. */
-  forget() {
-    return this.page.evaluate(() => Object.assign(window.record, { events: [], longTasks: [] }));
+  async forget() {
+    await this.page.evaluate(() => Object.assign(window.record, { events: [] }));
+    await this.forgetTasks();
+  }
+
+  /** Forgets the tasks of the page's thread, and nothing else. */
+  async forgetTasks() {
+    await this.page.evaluate(() => Object.assign(window.record, { longTasks: [], from_ms: performance.now() }));
+    await this.page.evaluate(mark, MARK);
   }
 
   /** Drops real files or folders from the disk onto the page, as the system's file manager does. */

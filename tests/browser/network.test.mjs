@@ -39,7 +39,7 @@ for (const [device, FIRST_S, WHOLE_S] of [['auto', 60, 360], ['cpu', 120, 600], 
       return;
     }
     const scan = withoutDepth(path, join(out, `hololens-${device}`));
-    const visitor = await browser.open({ path: `?autostart=0&device=${device}` });
+    const visitor = await browser.open({ path: `?autostart=0&device=${device}`, traced: true });
     const { page } = visitor;
     await visitor.until('idle');
     await visitor.drop(scan);
@@ -60,7 +60,7 @@ for (const [device, FIRST_S, WHOLE_S] of [['auto', 60, 360], ['cpu', 120, 600], 
     assert.deepEqual(await stages(visitor), STAGES);
     assert.ok(seconds(first) < FIRST_S, 'first surface in time');
     assert.ok(seconds(finished) < WHOLE_S, 'whole in time');
-    await visitor.isSmooth();
+    t.diagnostic(await visitor.isSmooth());
     assert.deepEqual(visitor.errors, []);
     assert.ok((await visitor.picture()).colours > 100, 'the room is in the picture');
     await page.screenshot({ path: join(pictures, `hololens-network-${device}.png`) });
@@ -159,7 +159,7 @@ test('how sure the network is and how many views there were are pictures of thei
 test('the view answers the hand while the network works', async (t) => {
   const real = join(root, '../shared/scans/hololens/scan');
   const scan = existsSync(real) ? withoutDepth(real, join(out, 'hololens-dragged')) : photos;
-  const visitor = await planned({ path: '?autostart=0', scan });
+  const visitor = await planned({ path: '?autostart=0', scan, traced: true });
   const { page } = visitor;
   const [worker] = page.workers();
   // The viewer's own frames: when each was drawn, in the worker.
@@ -192,10 +192,10 @@ test('the view answers the hand while the network works', async (t) => {
   };
   const ended = run(visitor, 12);
   await visitor.event('bricks', 120_000);
-  await visitor.page.evaluate(() => { window.record.longTasks = []; });
+  await visitor.forgetTasks();
   const busy = await drag(240_000, 'running');
   assert.ok((await ended).finished?.triangles > 0);
-  await visitor.isSmooth();
+  t.diagnostic(await visitor.isSmooth());
   await page.waitForTimeout(1000);
   const idle = await drag(6000, 'finished');
   const words = ({ median, p95, longest }) => `median ${median.toFixed(0)}, 95 % ${p95.toFixed(0)}, longest ${longest.toFixed(0)} ms`;

@@ -42,7 +42,7 @@ for (const { name, frames, limit_s, open } of scans) {
       t.skip('the real scans are not beside the repository');
       return;
     }
-    const visitor = await browser.open();
+    const visitor = await browser.open({ traced: true });
     const { page } = visitor;
     await visitor.until('idle');
     await visitor.forget();
@@ -58,7 +58,7 @@ for (const { name, frames, limit_s, open } of scans) {
     assert.equal(opened.format, '7-Scenes');
     assert.ok(seconds(brick) < 10, `first brick after ${seconds(brick)} s`);
     assert.ok(seconds(finished) < limit_s, `whole after ${seconds(finished)} s`);
-    await visitor.isSmooth();
+    t.diagnostic(await visitor.isSmooth());
     assert.ok((await visitor.picture()).colours > 100, 'the room is in the picture');
     await page.screenshot({ path: join(pictures, `${name}.png`) });
 

@@ -29,7 +29,7 @@ test('a room without depth is planned, matched, looked at and saved', async (t) 
   await build();
   const whole = join(out, 'sample-room');
   await sampleFolder(whole);
-  const visitor = await browser.open({ path: '?autostart=0' });
+  const visitor = await browser.open({ path: '?autostart=0', traced: true });
   await visitor.until('idle');
   await visitor.forget();
   await visitor.drop(withoutDepth(whole, join(out, 'photos')));
@@ -59,7 +59,7 @@ test('a room without depth is planned, matched, looked at and saved', async (t) 
   t.diagnostic(`${plan.keyframes} keyframes: first surface after ${seconds(first).toFixed(1)} s, whole after ${seconds(finished).toFixed(1)} s, ${finished.frames} fused, heap ${(finished.heapBytes / 1e6).toFixed(0)} MB`);
   assert.ok(first.at_ms < progress.at(-1).at_ms, 'there is something to see before the last keyframe is matched');
   assert.ok(finished.heapBytes < LIMIT_BYTES, `${finished.heapBytes} bytes of heap`);
-  await visitor.isSmooth();
+  t.diagnostic(await visitor.isSmooth());
   assert.deepEqual(visitor.errors, []);
   assert.ok((await visitor.picture()).colours > 100, 'the room is in the picture');
 
@@ -175,7 +175,7 @@ for (const device of ['gpu', 'cpu']) {
 }
 
 for (const device of ['gpu', 'auto']) test(`the view can be turned while views are matched; device ${device}`, async (t) => {
-  const visitor = await browser.open({ path: `?sample&autostart=0&device=${device}` });
+  const visitor = await browser.open({ path: `?sample&autostart=0&device=${device}`, traced: true });
   const { page } = visitor;
   await visitor.until('planned');
   await choose(visitor, { 'Depth from': 'stereo', 'Photos scaled to': '160 × 120', Keyframes: '30' });
@@ -195,7 +195,7 @@ for (const device of ['gpu', 'auto']) test(`the view can be turned while views a
   }
   assert.equal((await visitor.events('finished')).length, 0, 'the view has moved and come to rest before the run was over');
   t.diagnostic(`the view came to rest ${waits_ms.map((ms) => ms.toFixed(0)).join(', ')} ms after the pointer let go`);
-  await visitor.isSmooth();
+  t.diagnostic(await visitor.isSmooth());
   await page.click('#cancel');
   await visitor.until('finished');
   await visitor.close();

@@ -1,7 +1,12 @@
 //! What the engine's tasks share: the device, the screen, the scan, its plan and volume, and where a run stands.
 
 use crate::{
-    given::Given, messages::Event, page::Page, platform, rates::Measured, screen::Screen,
+    given::Given,
+    messages::{Event, StageName},
+    page::Page,
+    platform,
+    rates::Measured,
+    screen::Screen,
     weights::Weights,
 };
 use burn::tensor::Device;
@@ -39,6 +44,7 @@ pub struct Engine {
     /// What stages of an earlier run made, for the next.
     pub given: Given,
     state: Cell<RunState>,
+    stage: Cell<Option<StageName>>,
 }
 
 impl Engine {
@@ -62,12 +68,20 @@ impl Engine {
             volume: RefCell::default(),
             given: Given::default(),
             state: Cell::new(RunState::Idle),
+            stage: Cell::default(),
         }
     }
 
     /// Tells the page.
     pub fn emit(&self, event: &Event) {
         self.page.tell(event);
+    }
+
+    /// Tells which of a run's stages begins; one that is on already is not begun again.
+    pub fn enter(&self, stage: StageName) {
+        if self.stage.replace(Some(stage)) != Some(stage) {
+            self.emit(&Event::Stage { stage });
+        }
     }
 
     /// Tells that work cannot go on.
@@ -110,6 +124,7 @@ impl Engine {
     /// Clears the screen for a run.
     pub fn begin(&self, brick_size_m: f32) {
         self.set_state(RunState::Running);
+        self.stage.take();
         self.volume.take();
         self.screen.clear(brick_size_m, true);
     }

@@ -49,9 +49,7 @@ impl PageSink {
 impl Sink for PageSink {
     fn stage(&mut self, stage: Stage, total: usize) {
         self.total = total;
-        self.engine.emit(&Event::Stage {
-            stage: convert::stage_name(stage),
-        });
+        self.engine.enter(convert::stage_name(stage));
     }
 
     fn progress(&mut self, done: usize) {

@@ -71,9 +71,7 @@ impl Weights {
         let blob = self.fetch(engine).await?;
         let network = self.take(engine, blob)?;
         if self.warming.get() {
-            engine.emit(&Event::Stage {
-                stage: StageName::WarmingUp,
-            });
+            engine.enter(StageName::WarmingUp);
         }
         while self.warming.get() && engine.state() != RunState::Stopping {
             platform::sleep_ms(LOOK_MS).await;
@@ -111,9 +109,7 @@ impl Weights {
     }
 
     async fn fetch(&self, engine: &Rc<Engine>) -> Result<Blob, Fault> {
-        engine.emit(&Event::Stage {
-            stage: StageName::Downloading,
-        });
+        engine.enter(StageName::Downloading);
         let (told, began_ms) = (engine.clone(), platform::now_ms());
         let progress = Closure::<dyn FnMut(f64, f64)>::new(move |done: f64, total: f64| {
             told.emit(&Event::Progress {
