@@ -1,6 +1,9 @@
 //! The winning plane of every pixel, between two planes where the costs beside it say so.
 
-use crate::sweep::Spacing;
+use crate::{
+    lanes::{least_of, less},
+    sweep::Spacing,
+};
 use rayon::prelude::*;
 
 /// Planes this near to the winner do not count as another choice.
@@ -28,22 +31,15 @@ pub fn winners(cost: &[f32], sum: &[f32], base: Option<&[f32]>, offsets: &[f32])
     let winner = |at: usize| {
         let cells = at * planes..(at + 1) * planes;
         let (cost, sum) = (&cost[cells.clone()], &sum[cells]);
-        let mut best = 0;
-        for plane in 1..planes {
-            if sum[plane] < sum[best] {
-                best = plane;
-            }
-        }
+        let least = least_of(sum);
+        let best = sum.iter().position(|&sum| sum == least).unwrap_or(0);
         let shift = match best {
             0 => 0.0,
             _ if best + 1 == planes => 0.0,
             _ => vertex(sum[best - 1], sum[best], sum[best + 1]),
         };
-        let others = sum
-            .iter()
-            .enumerate()
-            .filter(|(plane, _)| plane.abs_diff(best) > SAME);
-        let second = others.fold(f32::MAX, |least, (_, &sum)| least.min(sum));
+        let (before, after) = (best.saturating_sub(SAME), (best + SAME + 1).min(planes));
+        let second = less(least_of(&sum[..before]), least_of(&sum[after..]));
         let base = base.map_or(0.0, |base| base[at]);
         let rho = base + spacing.at(best as f32 + shift);
         (rho, (1.0 - cost[best], (second - sum[best]) / PATHS))

@@ -60,7 +60,7 @@ pub fn local_planes(
                 sums.add(weight[there] / similar, dx as f32, dy as f32, off);
             }
         }
-        (own_rho + sums.at_centre(config.ridge)).max(crate::sweep::LEAST_RHO)
+        (own_rho + sums.at_centre(config.ridge)).max(crate::sample::LEAST_RHO)
     };
     let mut planes = vec![0.0; rho.len()];
     planes

@@ -5,6 +5,7 @@
 //! `L(p, d) = C(p, d) + min(L(q, d), L(q, d ± 1) + P1, min L(q) + P2') - min L(q)`, with
 //! `P2' = max(P1, P2 / (1 + |I(p) - I(q)| / edge))`; a path starts with its cost. The result is the sum over the eight.
 
+use crate::lanes::{least_of, less, more};
 use rayon::prelude::*;
 
 /// What a change of plane costs.
@@ -64,7 +65,8 @@ impl Job<'_> {
 
     fn far_penalty(&self, at: usize, from: usize) -> f32 {
         let SmoothConfig { p1, p2, edge } = *self.config;
-        (p2 / (1.0 + (self.gray[at] - self.gray[from]).abs() / edge)).max(p1)
+        let far = p2 / (1.0 + (self.gray[at] - self.gray[from]).abs() / edge);
+        more(far, p1)
     }
 
     /// The two paths along a row.
@@ -235,12 +237,12 @@ fn step(cost: &[f32], before: &[f32], least: f32, p1: f32, p2: f32, path: &mut [
     let far = least + p2;
     let (before, path) = (&before[..planes], &mut path[..planes]);
     for d in 1..planes - 1 {
-        let near = before[d - 1].min(before[d + 1]) + p1;
-        path[d] = cost[d] + (before[d].min(far).min(near) - least);
+        let near = less(before[d - 1], before[d + 1]) + p1;
+        path[d] = cost[d] + (less(less(before[d], far), near) - least);
     }
     let last = planes - 1;
-    path[0] = cost[0] + (before[0].min(far).min(before[1] + p1) - least);
-    path[last] = cost[last] + (before[last].min(far).min(before[last - 1] + p1) - least);
+    path[0] = cost[0] + (less(less(before[0], far), before[1] + p1) - least);
+    path[last] = cost[last] + (less(less(before[last], far), before[last - 1] + p1) - least);
     least_of(path)
 }
 
@@ -249,21 +251,4 @@ fn add(sum: &mut [f32], path: &[f32]) {
     for (sum, path) in sum.iter_mut().zip(path) {
         *sum += path;
     }
-}
-
-/// In eight strands, so that it is done in vectors.
-#[inline(always)]
-fn least_of(values: &[f32]) -> f32 {
-    let mut strands = [f32::MAX; 8];
-    let eights = values.chunks_exact(8);
-    let rest = eights.remainder();
-    for eight in eights {
-        for (least, value) in strands.iter_mut().zip(eight) {
-            *least = if value < least { *value } else { *least };
-        }
-    }
-    strands
-        .iter()
-        .chain(rest)
-        .fold(f32::MAX, |least, &value| least.min(value))
 }

@@ -7,8 +7,12 @@
 //! Of the sources that see the point the best share counts, since some are occluded (Kang, Szeliski and Chai 2001).
 
 use crate::{
+    lanes::{LANES, round},
+    sample::Picture,
     view::{View, Warp, warp},
-    window::{COST_STEPS, Count, Level, Padded, SCORE_STEPS, gray_steps, in_steps, round},
+    window::{
+        COST_STEPS, Count, Level, Padded, SCORE_STEPS, Windows, gray_steps, in_steps, window,
+    },
 };
 use rayon::prelude::*;
 use std::ops::Range;
@@ -19,11 +23,6 @@ const BAND: usize = 16;
 const BLOCK: usize = 8;
 /// Below every score: the source does not see the point.
 const UNSEEN: f32 = -2.0 * SCORE_STEPS;
-/// What a source sees is at least so far before it, as a multiple of the reference's depth.
-const LEAST_Z: f32 = 1e-6;
-/// An inverse depth cannot be less, in 1/m.
-pub(crate) const LEAST_RHO: f32 = 1e-3;
-
 /// How views are compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SweepConfig {
@@ -61,11 +60,7 @@ pub fn sweep_rows(
     let planes = offsets.len();
     let warps: Vec<Warp> = sources.iter().map(|s| warp(reference, s)).collect();
     let steps = gray_steps(config.radius);
-    let pictures = sources.iter().map(|source| Picture {
-        steps: in_steps(&source.gray, steps),
-        size: source.size(),
-    });
-    let pictures: Vec<Picture> = pictures.collect();
+    let pictures: Vec<Picture> = sources.iter().map(|s| Picture::new(s, steps)).collect();
     let mut cost = vec![1.0f32; rows.len() * width * planes];
     let job = Job {
         reference,
@@ -118,12 +113,6 @@ struct Job<'a> {
     config: &'a SweepConfig,
 }
 
-/// A source's grey values in steps.
-struct Picture {
-    steps: Vec<f32>,
-    size: (usize, usize),
-}
-
 impl Job<'_> {
     /// Costs of the rows `first..last`, with the processor's wide registers where it has them: the same numbers, faster.
     fn costs(&self, first: usize, last: usize, out: &mut [f32]) {
@@ -157,44 +146,46 @@ impl Job<'_> {
     fn band<const R: usize>(&self, first: usize, last: usize, out: &mut [f32]) {
         let (width, height) = self.reference.size();
         let planes = self.offsets.len();
-        let pixels = (last - first) * width;
+        // Rows are filled up with zeros to whole registers, or the loops over them would end pixel by pixel.
+        let wide = width.next_multiple_of(LANES);
+        let pixels = (last - first) * wide;
         // Rows that the windows reach.
         let (above, below) = (first.saturating_sub(R), (last + R).min(height));
         let steps = gray_steps(R);
-        let gray = in_steps(&self.reference.gray[above * width..below * width], steps);
-        let gray: Vec<i32> = gray.iter().map(|&gray| gray as i32).collect();
+        let mut gray = vec![0i32; (below - above) * wide];
+        for (to, y) in gray.chunks_exact_mut(wide).zip(above..below) {
+            let row = in_steps(&self.reference.gray[y * width..(y + 1) * width], steps);
+            for (to, gray) in to.iter_mut().zip(row) {
+                *to = gray as i32;
+            }
+        }
         let noise = self.config.noise_var * steps * steps;
         let span = |y: usize| {
-            (y.saturating_sub(R) - above) * width..((y + R + 1).min(height) - above) * width
+            (y.saturating_sub(R) - above) * wide..((y + R + 1).min(height) - above) * wide
         };
 
-        let mut column = [
-            Padded::<R>::new(width),
-            Padded::new(width),
-            Padded::new(width),
-        ];
-        // Per pixel: the size of its window, the reference's mean there, 1 / sqrt(variance sum with noise) in steps of a score.
-        let mut counts = vec![Count::default(); pixels];
-        let mut levels = vec![Level::default(); pixels];
-        let mut scales = vec![0.0f32; pixels];
+        let mut column = [Padded::<R>::new(wide), Padded::new(wide), Padded::new(wide)];
+        let mut windows = Windows::new(pixels);
         let squares: Vec<i32> = gray.iter().map(|v| v * v).collect();
+        let mut summed = 0..0;
         for y in first..last {
-            let at = (y - first) * width;
-            column[0].sum_rows(&gray[span(y)], width);
-            column[1].sum_rows(&squares[span(y)], width);
-            let rows = span(y).len() / width;
+            let at = (y - first) * wide;
+            column[0].slide(&gray, &summed, &span(y), wide);
+            column[1].slide(&squares, &summed, &span(y), wide);
+            summed = span(y);
+            let rows = span(y).len() / wide;
             for x in 0..width {
                 let columns = (x + R + 1).min(width) - x.saturating_sub(R);
                 let count = Count::new(rows * columns);
-                let level = Level::new(column[0].window(x), count);
-                let variance = level.variance(column[1].window(x), count) + count.times(noise);
-                counts[at + x] = count;
-                levels[at + x] = level;
-                scales[at + x] = SCORE_STEPS / variance.sqrt();
+                // SAFETY: the part is of one pixel.
+                let sum = |column: &Padded<R>| unsafe { window::<R>(column.part(x, 1), 0) };
+                let level = Level::new(sum(&column[0]), count);
+                let variance = level.variance(sum(&column[1]), count) + count.times(noise);
+                windows.set(at + x, count, level, SCORE_STEPS / variance.sqrt());
             }
         }
 
-        let reach = (below - above) * width;
+        let reach = (below - above) * wide;
         let (mut warped, mut warped_squares, mut products) =
             (vec![0i32; reach], vec![0i32; reach], vec![0i32; reach]);
         let mut seen = vec![0.0f32; reach];
@@ -209,66 +200,77 @@ impl Job<'_> {
                 let offset = spacing.at((block_index * BLOCK + plane) as f32);
                 best.fill(UNSEEN);
                 count.fill(0.0);
-                for (source, warp) in self.pictures.iter().zip(self.warps) {
+                for (index, (source, warp)) in self.pictures.iter().zip(self.warps).enumerate() {
+                    // So many are above `UNSEEN` at most, with this one.
+                    let ranks = most.min(index + 1);
                     for y in above..below {
-                        let row = (y - above) * width..(y - above + 1) * width;
+                        let row = (y - above) * wide..(y - above + 1) * wide;
                         let base = self.base.map(|base| &base[y * width..(y + 1) * width]);
-                        warp_row(
-                            source,
+                        source.sample_row(
                             warp,
                             y,
                             base,
                             offset,
-                            &mut warped[row.clone()],
-                            &mut seen[row.clone()],
+                            &mut warped[row.clone()][..width],
+                            &mut seen[row.clone()][..width],
                         );
                         let (gray, warped) = (&gray[row.clone()], &warped[row.clone()]);
                         let (squares, products) =
                             (&mut warped_squares[row.clone()], &mut products[row]);
-                        for x in 0..width {
+                        for x in 0..wide {
                             squares[x] = warped[x] * warped[x];
                             products[x] = warped[x] * gray[x];
                         }
                     }
+                    column.iter_mut().for_each(Padded::clear);
+                    let mut summed = 0..0;
                     for y in first..last {
-                        column[0].sum_rows(&warped[span(y)], width);
-                        column[1].sum_rows(&warped_squares[span(y)], width);
-                        column[2].sum_rows(&products[span(y)], width);
-                        let at = (y - first) * width;
-                        let here = at..at + width;
-                        let seen = &seen[(y - above) * width..(y - above + 1) * width];
-                        let (counts, levels, scales) = (
-                            &counts[here.clone()],
-                            &levels[here.clone()],
-                            &scales[here.clone()],
-                        );
+                        let rows = span(y);
+                        column[0].slide(&warped, &summed, &rows, wide);
+                        column[1].slide(&warped_squares, &summed, &rows, wide);
+                        column[2].slide(&products, &summed, &rows, wide);
+                        summed = rows;
+                        let at = (y - first) * wide;
+                        let here = at..at + wide;
+                        let seen = &seen[(y - above) * wide..(y - above + 1) * wide];
                         let count = &mut count[here];
                         let mut score = [0.0f32; 64];
-                        for from in (0..width).step_by(64) {
-                            let n = (width - from).min(64);
-                            for (i, score) in score[..n].iter_mut().enumerate() {
-                                let x = from + i;
-                                let (s, ss, rs) = (
-                                    column[0].window(x),
-                                    column[1].window(x),
-                                    column[2].window(x),
-                                );
-                                let n = counts[x];
-                                let level = Level::new(s, n);
-                                let covariance = level.covariance(levels[x], rs, n);
-                                let variance = level.variance(ss, n) + n.times(noise);
-                                let correlation = covariance * scales[x] / variance.sqrt();
-                                *score = if seen[x] > 0.0 {
+                        for from in (0..wide).step_by(64) {
+                            let n = (wide - from).min(64);
+                            let windows = windows.part(at + from, n);
+                            let [gray, squares, products] = &column;
+                            let (gray, squares, products) = (
+                                gray.part(from, n),
+                                squares.part(from, n),
+                                products.part(from, n),
+                            );
+                            let (seen, count) = (&seen[from..][..n], &mut count[from..][..n]);
+                            let score = &mut score[..n];
+                            for i in 0..n {
+                                // SAFETY: the parts are of `n` pixels, as are the scores.
+                                let (s, ss, rs) = unsafe {
+                                    (
+                                        window::<R>(gray, i),
+                                        window::<R>(squares, i),
+                                        window::<R>(products, i),
+                                    )
+                                };
+                                let pixels = windows.count(i);
+                                let level = Level::new(s, pixels);
+                                let covariance = level.covariance(windows.level(i), rs, pixels);
+                                let variance = level.variance(ss, pixels) + pixels.times(noise);
+                                let correlation = covariance * windows.scale[i] / variance.sqrt();
+                                score[i] = if seen[i] > 0.0 {
                                     round(correlation)
                                 } else {
                                     UNSEEN
                                 };
-                                count[x] += seen[x];
+                                count[i] += seen[i];
                             }
                             // Keeps the best in order: each pushes the lesser one down.
-                            for rank in 0..most {
+                            for rank in 0..ranks {
                                 let best = &mut best[rank * pixels + at + from..][..n];
-                                for (score, best) in score[..n].iter_mut().zip(best) {
+                                for (score, best) in score.iter_mut().zip(best) {
                                     let (high, low) = if *score > *best {
                                         (*score, *best)
                                     } else {
@@ -304,87 +306,13 @@ impl Job<'_> {
                 }
             }
             let run = offsets.len();
-            for (pixel, out) in out.chunks_exact_mut(planes).enumerate() {
+            for (index, out) in out.chunks_exact_mut(planes).enumerate() {
+                let pixel = index / width * wide + index % width;
                 let out = &mut out[block_index * BLOCK..][..run];
                 for (plane, out) in out.iter_mut().enumerate() {
                     *out = block[plane * pixels + pixel];
                 }
             }
-        }
-    }
-}
-
-/// Samples one row of a source at the hypotheses of a plane; `seen` is 1 where the sample lies in the source, else 0 and the
-/// nearest pixel of its border stands in.
-#[inline(always)]
-fn warp_row(
-    source: &Picture,
-    warp: &Warp,
-    y: usize,
-    base: Option<&[f32]>,
-    offset: f32,
-    out: &mut [i32],
-    seen: &mut [f32],
-) {
-    let width = out.len();
-    let (columns, rows) = source.size;
-    // A hair inside, so that the right and lower neighbour exist.
-    let (last_u, last_v) = (columns as f32 - 1.001, rows as f32 - 1.001);
-    let Warp { a, b } = warp;
-    let y = y as f32;
-    let start = [a[1] * y + a[2], a[4] * y + a[5], a[7] * y + a[8]];
-    let gray = &source.steps[..columns * rows];
-    let (mut at, mut fu, mut fv) = ([0u32; 64], [0.0f32; 64], [0.0f32; 64]);
-    for from in (0..width).step_by(64) {
-        let n = (width - from).min(64);
-        // Always all 64, and no index that could be out of bounds: that is what makes this loop one of vectors.
-        let mut rhos = [offset; 64];
-        if let Some(base) = base {
-            for (rho, base) in rhos.iter_mut().zip(&base[from..from + n]) {
-                *rho = (base + offset).max(LEAST_RHO);
-            }
-        }
-        let mut inside = [0.0f32; 64];
-        for i in 0..64 {
-            let (x, rho) = ((from as i32 + i as i32) as f32, rhos[i]);
-            let z = a[6] * x + start[2] + b[2] * rho;
-            let (u, v) = (
-                a[0] * x + start[0] + b[0] * rho,
-                a[3] * x + start[1] + b[1] * rho,
-            );
-            // 0 <= u / z <= last with z > 0, without the division.
-            let room = u.min(last_u * z - u).min(v).min(last_v * z - v);
-            inside[i] = if room.min(z - LEAST_Z) >= 0.0 {
-                1.0
-            } else {
-                0.0
-            };
-            let inv = 1.0 / z.max(LEAST_Z);
-            let (u, v) = (u * inv, v * inv);
-            let (cu, cv) = (u.max(0.0).min(last_u), v.max(0.0).min(last_v));
-            // SAFETY: clamped to the picture just now, NaN included (max gives 0).
-            let (iu, iv): (i32, i32) = unsafe { (cu.to_int_unchecked(), cv.to_int_unchecked()) };
-            fu[i] = cu - iu as f32;
-            fv[i] = cv - iv as f32;
-            at[i] = (iv * columns as i32 + iu) as u32;
-        }
-        seen[from..from + n].copy_from_slice(&inside[..n]);
-        for (i, out) in out[from..from + n].iter_mut().enumerate() {
-            let at = at[i] as usize;
-            // SAFETY: `at` has a right and a lower neighbour in the picture: see `last_u` and `last_v`.
-            let (p, q, r, s) = unsafe {
-                (
-                    *gray.get_unchecked(at),
-                    *gray.get_unchecked(at + 1),
-                    *gray.get_unchecked(at + columns),
-                    *gray.get_unchecked(at + columns + 1),
-                )
-            };
-            let top = p + (q - p) * fu[i];
-            let bottom = r + (s - r) * fu[i];
-            let sample = round(top + (bottom - top) * fv[i]);
-            // SAFETY: between samples of a picture, some thousands of steps at most.
-            *out = unsafe { sample.to_int_unchecked() };
         }
     }
 }

@@ -5,6 +5,9 @@
 //! over the picture. So pictures are whole steps of a grey level, sums are whole numbers, and both sums are moved to
 //! the window's own mean, exactly, before they are subtracted. All devices do the same.
 
+use crate::lanes::{round, whole};
+use std::ops::Range;
+
 /// The middle of the grey scale, from which steps are counted.
 pub(crate) const MIDDLE: f32 = 128.0;
 
@@ -14,18 +17,9 @@ pub(crate) const SCORE_STEPS: f32 = 30_000.0;
 /// Steps of a unit of cost; costs lie from 0 to 2.
 pub(crate) const COST_STEPS: f32 = 15_000.0;
 
-/// 1.5 * 2^23: between 2^23 and 2^24 floats are whole numbers.
-const ROUND: f32 = 12_582_912.0;
-
 /// Steps of a grey level with windows of this radius: the squares of a window, taken from its mean, fit in 31 bits.
 pub(crate) const fn gray_steps(radius: usize) -> f32 {
     if radius <= 2 { 64.0 } else { 32.0 }
-}
-
-/// The nearest whole number, for numbers below 2^22.
-#[inline(always)]
-pub(crate) fn round(number: f32) -> f32 {
-    (number + ROUND) - ROUND
 }
 
 /// A picture in steps from the middle.
@@ -42,33 +36,65 @@ impl<const R: usize> Padded<R> {
         Self(vec![0; width + 2 * R])
     }
 
-    /// Sums some rows of `width` values.
+    /// Forgets all rows.
+    pub(crate) fn clear(&mut self) {
+        self.0.fill(0);
+    }
+
+    /// From the sums of the rows `from` of `values` to those of `to`, which begin and end no earlier: adds what comes in and takes away what goes out, which whole
+    /// numbers allow. Both count values, `width` a row.
     #[inline(always)]
-    pub(crate) fn sum_rows(&mut self, rows: &[i32], width: usize) {
-        let to = &mut self.0[R..R + width];
-        let mut rows = rows.chunks_exact(width);
-        if let Some(first) = rows.next() {
-            to.copy_from_slice(first);
+    pub(crate) fn slide(
+        &mut self,
+        values: &[i32],
+        from: &Range<usize>,
+        to: &Range<usize>,
+        width: usize,
+    ) {
+        let sums = &mut self.0[R..R + width];
+        let (old, new) = (&values[from.start..to.start], &values[from.end..to.end]);
+        if old.len() == width && new.len() == width {
+            for ((sum, new), old) in sums.iter_mut().zip(new).zip(old) {
+                *sum = sum.wrapping_add(new.wrapping_sub(*old));
+            }
+            return;
         }
-        for row in rows {
-            for (to, from) in to.iter_mut().zip(row) {
-                *to = to.wrapping_add(*from);
+        for row in new.chunks_exact(width) {
+            for (sum, new) in sums.iter_mut().zip(row) {
+                *sum = sum.wrapping_add(*new);
+            }
+        }
+        for row in old.chunks_exact(width) {
+            for (sum, old) in sums.iter_mut().zip(row) {
+                *sum = sum.wrapping_sub(*old);
             }
         }
     }
 
+    /// What the windows of `n` pixels reach.
     #[inline(always)]
-    pub(crate) fn window(&self, x: usize) -> i32 {
-        let mut sum = 0i32;
-        for k in 0..2 * R + 1 {
-            sum = sum.wrapping_add(self.0[x + k]);
-        }
-        sum
+    pub(crate) fn part(&self, from: usize, n: usize) -> &[i32] {
+        &self.0[from..][..n + 2 * R]
     }
 }
 
+/// The sum over the window of one pixel of a [`Padded::part`]. Nothing is checked: the check alone would end the loops over pixels one pixel at a time.
+///
+/// # Safety
+/// The part is of more than `x` pixels.
+#[inline(always)]
+pub(crate) unsafe fn window<const R: usize>(sums: &[i32], x: usize) -> i32 {
+    debug_assert!(x + 2 * R < sums.len());
+    let mut sum = 0i32;
+    for k in 0..2 * R + 1 {
+        // SAFETY: a part has `2 R` more than its pixels.
+        sum = sum.wrapping_add(unsafe { *sums.get_unchecked(x + k) });
+    }
+    sum
+}
+
 /// The pixels of a window: how many.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 pub(crate) struct Count {
     whole: i32,
     per: f32,
@@ -90,7 +116,7 @@ impl Count {
 }
 
 /// A window's sum, its mean as a whole number, and what the sum is beside that.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 pub(crate) struct Level {
     sum: i32,
     mean: i32,
@@ -100,9 +126,7 @@ pub(crate) struct Level {
 impl Level {
     #[inline(always)]
     pub(crate) fn new(sum: i32, count: Count) -> Self {
-        let mean = round(sum as f32 * count.per);
-        // SAFETY: a mean of steps is one of a few thousand whole numbers.
-        let mean: i32 = unsafe { mean.to_int_unchecked() };
+        let mean = whole(sum as f32 * count.per);
         Self {
             sum,
             mean,
@@ -126,6 +150,82 @@ impl Level {
             .wrapping_sub(self.mean.wrapping_mul(other.beside))
             .wrapping_sub(other.mean.wrapping_mul(self.sum));
         around as f32 - self.beside as f32 * other.beside as f32 * count.per
+    }
+}
+
+/// The reference's windows. Each number has a row of its own: mixed, they would have to be sorted apart for wide registers.
+pub(crate) struct Windows {
+    whole: Vec<i32>,
+    per: Vec<f32>,
+    sum: Vec<i32>,
+    mean: Vec<i32>,
+    beside: Vec<i32>,
+    scale: Vec<f32>,
+}
+
+impl Windows {
+    pub(crate) fn new(pixels: usize) -> Self {
+        Self {
+            whole: vec![0; pixels],
+            per: vec![0.0; pixels],
+            sum: vec![0; pixels],
+            mean: vec![0; pixels],
+            beside: vec![0; pixels],
+            scale: vec![0.0; pixels],
+        }
+    }
+
+    /// `scale` is 1 / sqrt(variance sum with noise) in steps of a score.
+    pub(crate) fn set(&mut self, pixel: usize, count: Count, level: Level, scale: f32) {
+        self.whole[pixel] = count.whole;
+        self.per[pixel] = count.per;
+        self.sum[pixel] = level.sum;
+        self.mean[pixel] = level.mean;
+        self.beside[pixel] = level.beside;
+        self.scale[pixel] = scale;
+    }
+
+    /// Those of `n` pixels.
+    #[inline(always)]
+    pub(crate) fn part(&self, from: usize, n: usize) -> Part<'_> {
+        Part {
+            whole: &self.whole[from..][..n],
+            per: &self.per[from..][..n],
+            sum: &self.sum[from..][..n],
+            mean: &self.mean[from..][..n],
+            beside: &self.beside[from..][..n],
+            scale: &self.scale[from..][..n],
+        }
+    }
+}
+
+/// Some [`Windows`].
+#[derive(Clone, Copy)]
+pub(crate) struct Part<'a> {
+    whole: &'a [i32],
+    per: &'a [f32],
+    sum: &'a [i32],
+    mean: &'a [i32],
+    beside: &'a [i32],
+    pub(crate) scale: &'a [f32],
+}
+
+impl Part<'_> {
+    #[inline(always)]
+    pub(crate) fn count(&self, i: usize) -> Count {
+        Count {
+            whole: self.whole[i],
+            per: self.per[i],
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn level(&self, i: usize) -> Level {
+        Level {
+            sum: self.sum[i],
+            mean: self.mean[i],
+            beside: self.beside[i],
+        }
     }
 }
 
