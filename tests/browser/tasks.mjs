@@ -4,8 +4,11 @@ import assert from 'node:assert/strict';
 
 const CATEGORIES = ['disabled-by-default-devtools.timeline', 'blink.user_timing'];
 export const MARK = 'tasks-from-here';
-/** Share of a journey's time that long tasks by the clock may take together: a thread may wait for its turn, not stand still. */
-const WAITING = 0.02;
+/**
+ * What long tasks by the clock may take together, as a share of the journey: a thread may wait for its turn, not stand still. In a short
+ * journey the start, where the engine is compiled beside the page, is much of it (283 ms with the whole browser on one core).
+ */
+const WAITING = { share: 0.02, least_ms: 500 };
 
 /** Runs in the page: what was done before the mark is not counted. */
 export function mark(name) {
@@ -62,6 +65,6 @@ export function assertSmooth(worked_ms, long, elapsed_ms) {
   const told = `work of the longest tasks ${worked_ms.slice(0, 3).map((ms) => ms.toFixed(1)).join(', ')} ms; long by the clock: ${JSON.stringify(long)}`;
   assert.ok(worked_ms.length > 0 && worked_ms[0] <= 50, told);
   const waited_ms = long.reduce((sum, { duration }) => sum + duration, 0);
-  assert.ok(waited_ms <= WAITING * elapsed_ms, `${told} in ${elapsed_ms.toFixed(0)} ms`);
+  assert.ok(waited_ms <= Math.max(WAITING.share * elapsed_ms, WAITING.least_ms), `${told} in ${elapsed_ms.toFixed(0)} ms`);
   return told;
 }
